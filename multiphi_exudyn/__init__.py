@@ -1,12 +1,12 @@
 """Multi-Phi: structures with contacts as piecewise-linear modal models, exact in time between events.
 
-A structure (M, C, K, named points) and its contacts make levels, one for each set of closed contacts, each with its
-own modes and asymptotic configuration; transitions carry the motion from level to level.
+A structure (M, C, K, named points) and its contacts have levels, one for each set of closed contacts, with modes and an
+asymptotic configuration; transitions transfer the motion from one level to another.
 
-The public names stand in public.py. They are loaded when the first of them is asked for, so that what needs none of
-them, as the command line's help, starts at once.
+The public names are in public.py. They are loaded with the first access, so that programs without them, such as the
+help of the command line, start at once.
 
-Every room imports only from those before it in this order, and so do the files of a room.
+Every room imports only from rooms before it in this order, and so do the files of a room.
 
 Order: errors, version, display, files, mathematics, mechanics, levels, events, time, steady, public, exudyn_plugin,
 study, cli, __main__.

@@ -1,7 +1,7 @@
-"""Errors raised on purpose: what was given, and what was needed; the warning that an answer may be wrong.
+"""Errors of the package, whose messages say what was given and what is needed, and its warning.
 
-Every error is a :class:`MultiPhiError` and, beside that, the built-in error an engineer would expect,
-so ``except ValueError`` keeps working in code that has never heard of this package.
+Every error is a :class:`MultiPhiError` and also the built-in error that an engineer would expect, so ``except
+ValueError`` works without an import of this package.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ __all__ = ["MultiPhiError", "MultiPhiTypeError", "MultiPhiValueError", "MultiPhi
 
 
 class MultiPhiError(Exception):
-    """Root of every error this package raises on purpose: what was given, and what was needed.
+    """Base class of every error of this package; the message says what was given and what is needed.
 
     Each is also the built-in error that an engineer would expect (ValueError, TypeError, RuntimeError), so code that
-    catches those keeps working.
+    catches those works.
 
     Examples
     --------
@@ -27,7 +27,7 @@ class MultiPhiError(Exception):
 
 
 class MultiPhiValueError(MultiPhiError, ValueError):
-    """An argument has the right kind and the wrong value; also a ValueError.
+    """Error for an argument of the right type with a wrong value; also a ValueError.
 
     Examples
     --------
@@ -41,7 +41,7 @@ class MultiPhiValueError(MultiPhiError, ValueError):
 
 
 class MultiPhiTypeError(MultiPhiError, TypeError):
-    """An argument has the wrong kind; also a TypeError.
+    """Error for an argument of a wrong type; also a TypeError.
 
     Examples
     --------
@@ -55,9 +55,9 @@ class MultiPhiTypeError(MultiPhiError, TypeError):
 
 
 class NumericalFailure(MultiPhiError, RuntimeError):
-    """A computation could not be carried through, and the message names the cause; also a RuntimeError.
+    """Failure of a computation, whose cause is in the message; also a RuntimeError.
 
-    A run does not raise it: it ends early with the status "failed" and the cause in its ``message``.
+    A run does not raise it, but ends early with the status "failed" and the cause in its ``message``.
 
     Examples
     --------
@@ -68,11 +68,11 @@ class NumericalFailure(MultiPhiError, RuntimeError):
 
 
 class MultiPhiWarning(UserWarning):
-    """An answer was found, and there is a reason to distrust it; the sentence is in its ``warnings`` too.
+    """Warning that a result may be inaccurate; the result has the sentence in its ``warnings`` too.
 
     Examples
     --------
-    Make an error of every warning, for runs that nobody watches:
+    Turn every warning into an error, for unattended runs:
 
     >>> import warnings
     >>> import multiphi_exudyn as mp

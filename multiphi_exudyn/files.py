@@ -1,4 +1,4 @@
-"""A file appears whole or not at all."""
+"""Writing of files that are complete or do not exist."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["write_whole"]
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write beside the file and rename."""
+    """Write a temporary file in the same folder and rename it, so that no incomplete file appears."""
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:

@@ -2,10 +2,10 @@
 
     s = g open, s = -g closed;   s = row . z + constant,   z = (eta, eta'),   z' = A z + b   in a level
 
-A contact is armed while s >= 0, and asks where s falls through zero. It changes unless s in the level it would enter is
-negative and falling; of several that may not together, the first that may alone. Where s is negative after a change it
-recovers while s rises, and where it asked in vain it is refused: it waits for s, or for s in the level it would enter,
-to rise to zero. A sign is that of the first derivative that is not round-off.
+A contact is armed while s >= 0, and requests a change when s falls through zero. It changes unless s in the new level
+is negative and falling; if several cannot change together, the first that can change alone does. If s is negative after
+a change, the contact recovers while s rises. A contact whose request was refused waits until s, or s in the level of
+its request, has risen to zero. The sign of s is that of its first derivative that is not round-off.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 
 __all__ = ["Signal", "SpringRule"]
 
-ROUND_OFF = 1e-13  # of its terms: a sum below it has no sign
-DERIVATIVES = 6  # that are asked for a sign
+ROUND_OFF = 1e-13  # of its terms: a smaller sum has no sign
+DERIVATIVES = 6  # number of derivatives for the sign
 ROUNDS = 20  # of decisions at one instant
 
 
 @dataclass(frozen=True)
 class Signal:
-    """row . z + constant, row (2 r,)."""
+    """Signal s = row . z + constant, row (2 r,)."""
 
     row: np.ndarray
     constant: float
@@ -40,17 +40,17 @@ class Signal:
 
     @property
     def rate(self) -> Signal:
-        """Its time derivative, where it does not depend on velocities."""
+        """Time derivative of a signal that does not depend on velocities."""
         return Signal(np.concatenate([np.zeros(len(self.row) // 2), self.row[: len(self.row) // 2]]), 0.0)
 
     def at(self, z: np.ndarray) -> float:
-        """Its value."""
+        """Value at the state z (2 r,)."""
         return float(self.row @ z) + self.constant
 
 
 @dataclass(frozen=True)
 class _Motion:
-    """z and its derivatives (k, 2 r) at an instant, and of which terms they are the sums."""
+    """z and its derivatives (k, 2 r) at an instant, and the sizes of their terms."""
 
     values: np.ndarray
     sizes: np.ndarray
@@ -68,18 +68,18 @@ class SpringRule:
     def __init__(self, model: MultiPhiModel) -> None:
         self.model = model
         self._levels: dict[tuple[int, ...], LoadedLevel] = {}
-        self._ways: dict[tuple[tuple[int, ...], tuple[int, ...]], Transition] = {}
+        self._transitions: dict[tuple[tuple[int, ...], tuple[int, ...]], Transition] = {}
 
     def start(self, displacement: np.ndarray) -> State:
         """The first state of a run from rest at y (m,) in base coordinates."""
         base = self.model.base
         level = self.level(np.flatnonzero(base.directions.T @ displacement + base.gaps < 0).tolist())
         eta = level.level.vectors.T @ (displacement - level.asymptotic.configuration)
-        return self._settled(self._standing(State(level, eta, np.zeros_like(eta), ())), set())
+        return self._resolve_refused(self._with_phases(State(level, eta, np.zeros_like(eta), ())), set())
 
-    def decide(self, state: State, asking: set[int]) -> State:
-        """The state right after an instant at which these contacts ask to change."""
-        return self._settled(self._answered(state, asking), set(asking))
+    def decide(self, state: State, requesting: set[int]) -> State:
+        """State right after an instant at which these contacts request a change."""
+        return self._resolve_refused(self._change_requested(state, requesting), set(requesting))
 
     def level(self, closed: Iterable[int]) -> LoadedLevel:
         """The level with these contacts closed."""
@@ -90,57 +90,57 @@ class SpringRule:
 
     def signal(self, level: LoadedLevel, contact: int) -> Signal:
         """s of a contact in a level."""
-        own = level.level
-        open_ = Signal(np.pad(own.gap_rows[contact], (0, own.modes)), float(level.gap_constants[contact]))
-        return -open_ if contact in own.indices else open_
+        plain = level.level
+        open_ = Signal(np.pad(plain.gap_rows[contact], (0, plain.modes)), float(level.gap_constants[contact]))
+        return -open_ if contact in plain.indices else open_
 
     def entered_signal(self, level: LoadedLevel, contact: int) -> Signal:
-        """s that it would have after a change, of the state in the level before."""
+        """s of a contact after its change, as a signal of the state before the change."""
         target = self.level({contact}.symmetric_difference(level.level.indices))
-        move, there = self._way(level, target), self.signal(target, contact)
+        move, there = self._transition(level, target), self.signal(target, contact)
         row = there.row[: target.level.modes]
         return Signal(np.pad(row @ move.matrix, (0, level.level.modes)), there.constant + float(row @ move.offset))
 
-    def _way(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
+    def _transition(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
         key = source.level.indices, target.level.indices
-        if key not in self._ways:
-            self._ways[key] = Transition(source, target)
-        return self._ways[key]
+        if key not in self._transitions:
+            self._transitions[key] = Transition(source, target)
+        return self._transitions[key]
 
-    def _settled(self, state: State, heard: set[int]) -> State:
-        """The state after all who are refused at its instant have been heard too."""
+    def _resolve_refused(self, state: State, treated: set[int]) -> State:
+        """State after the requests of all contacts that are refused at this instant."""
         for _ in range(ROUNDS):
-            unheard = {i for i, phase in enumerate(state.phases) if phase is Phase.REFUSED} - heard
-            if not unheard:
+            untreated = {i for i, phase in enumerate(state.phases) if phase is Phase.REFUSED} - treated
+            if not untreated:
                 return state
-            heard |= unheard
-            state = self._answered(state, unheard)
+            treated |= untreated
+            state = self._change_requested(state, untreated)
         raise NumericalFailure("contacts: no set of closed contacts is admissible at this instant")
 
-    def _answered(self, state: State, asking: set[int]) -> State:
-        """Those that ask change, or those of them, or the first of them, that the level they enter admits."""
-        wishes = [asking]
-        while wishes:
-            wished = wishes.pop(0)
-            entered = self._standing(self._moved(state, wished))
-            denied = {i for i in wished if entered.phases[i] is Phase.REFUSED}
-            if not denied:
+    def _change_requested(self, state: State, requesting: set[int]) -> State:
+        """State after a change of the requesting contacts, or of those, or the first one, that the new level admits."""
+        candidates = [requesting]
+        while candidates:
+            changing = candidates.pop(0)
+            entered = self._with_phases(self._after_change(state, changing))
+            refused = {i for i in changing if entered.phases[i] is Phase.REFUSED}
+            if not refused:
                 return entered
-            if denied < wished:
-                wishes = [wished - denied]
-            elif len(wished) > 1:
-                wishes = [{i} for i in sorted(wished)]
-        return self._standing(state, asking)
+            if refused < changing:
+                candidates = [changing - refused]
+            elif len(changing) > 1:
+                candidates = [{i} for i in sorted(changing)]
+        return self._with_phases(state, requesting)
 
-    def _moved(self, state: State, changing: set[int]) -> State:
-        """The state in the level in which these contacts have changed (eq. 38.6)."""
+    def _after_change(self, state: State, changing: set[int]) -> State:
+        """State in the level after the change of these contacts (eq. 38.6)."""
         level = self.level(changing.symmetric_difference(state.level.level.indices))
-        move = self._way(state.level, level)
+        move = self._transition(state.level, level)
         displacement, velocity = move.displacement(state.displacement), move.velocity(state.velocity)
         return replace(state, level=level, displacement=displacement, velocity=velocity)
 
-    def _standing(self, state: State, refused: Iterable[int] = ()) -> State:
-        """The state with the phase of every contact; ``refused``: those that asked in vain."""
+    def _with_phases(self, state: State, refused: Iterable[int] = ()) -> State:
+        """State with the phase of every contact; refused: contacts whose request was refused."""
         motion = _motion(state)
         phases = [self._phase(motion, state, contact) for contact in range(len(self.model.contacts))]
         for contact in refused:
@@ -158,17 +158,17 @@ class SpringRule:
 def _motion(state: State) -> _Motion:
     """z, A z + b, A (A z + b), ... at a state.
 
-    Of a state between swings either half may be round-off: what the other one makes of it, by omega, counts too.
+    At a turning point displacement or velocity may be round-off, so the sizes include the other one, scaled by omega.
     """
-    own, (eta, eta_t) = state.level.level, (state.displacement, state.velocity)
-    identity, omega = np.eye(own.modes), own.omega
-    a = np.block([[0 * identity, identity], [-np.diag(omega**2), -own.damping]])
-    periods = np.divide(1.0, omega, out=np.zeros(own.modes), where=omega > 0)
+    plain, (eta, eta_t) = state.level.level, (state.displacement, state.velocity)
+    identity, omega = np.eye(plain.modes), plain.omega
+    a = np.block([[0 * identity, identity], [-np.diag(omega**2), -plain.damping]])
+    periods = np.divide(1.0, omega, out=np.zeros(plain.modes), where=omega > 0)
     values = [np.concatenate([eta, eta_t])]
     sizes = [np.concatenate([np.abs(eta) + periods * np.abs(eta_t), np.abs(eta_t) + omega * np.abs(eta)])]
-    constant = np.concatenate([np.zeros(own.modes), state.level.asymptotic.drive])
+    constant = np.concatenate([np.zeros(plain.modes), state.level.asymptotic.drive])
     for _ in range(DERIVATIVES):
         values.append(a @ values[-1] + constant)
         sizes.append(np.abs(a) @ sizes[-1] + np.abs(constant))
-        constant = np.zeros(2 * own.modes)
+        constant = np.zeros(2 * plain.modes)
     return _Motion(np.array(values), np.array(sizes))

@@ -1,11 +1,11 @@
-"""The reduced equations of every level integrated step by step by scipy's solve_ivp, contacts as terminal events.
+"""Stepwise reference: the reduced equations of every level by scipy's solve_ivp, with contacts as terminal events.
 
     z = (eta, eta'),   z' = [0, I; -diag(omega^2), -D] z + (0, drive)                                       (38.3)
 
-What the levels are and how a state passes from one to the next (38.6) is that of the reduced model; what differs is the
-integration, an error tolerance instead of closed forms, with events that are seen only where a signal's sign differs at
-the two ends of a step, and the code of the rule (spring_rule.py). Contacts with springs only. An event is not found
-again at the instant of the restart: it has a direction, and there its sign is known while its value is round-off.
+Levels and transitions (38.6) are those of the reduced model. Different are the integration, by an error tolerance
+instead of closed forms, the detection of events, by a change of a signal's sign between the two ends of a step, and the
+code of the rule (spring_rule.py). Contacts have springs only. An event is not detected again at its own instant, where
+the value of the signal is round-off: the sign there is given.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from reference_models.spring_rule import Signal, SpringRule
 
 __all__ = ["StepwiseHistories", "StepwiseRun", "solve_stepwise"]
 
-INSTANT = 64 * np.finfo(float).eps  # of time, and s: solve_ivp locates events to 4 of these epsilons
+INSTANT = 64 * np.finfo(float).eps  # of time, and in s: solve_ivp locates events to 4 epsilons
 CHATTER = 200  # events in a row, in less than
 CHATTER_PERIODS = 10  # periods of the highest kept mode, are chatter
 
-UNSTABLE = 2.0  # times the energy of the start: a run that has gained as much is not worth its end
+UNSTABLE = 2.0  # times the energy at the start: a run with more energy is unstable and is ended
 
 Function = Callable[[float, np.ndarray], Any]
 
@@ -43,18 +43,18 @@ class StepwiseSegment:
 
     @property
     def start(self) -> float:
-        """Where it begins [s]."""
+        """Start of the segment [s]."""
         return float(self.solution.ts[0])
 
     @property
     def end(self) -> float:
-        """Where it ends [s]."""
+        """End of the segment [s]."""
         return float(self.solution.ts[-1])
 
 
 @dataclass(frozen=True)
 class StepwiseHistories:
-    """Of every point and contact asked for: displacement, gap [m] and force [N], (k,) each; energy (k,) [J]."""
+    """Histories (k,) of displacements [m] by point, gaps [m] and forces [N] by contact, and of the energy [J]."""
 
     points: dict[str, np.ndarray]
     gaps: dict[str, np.ndarray]
@@ -64,7 +64,7 @@ class StepwiseHistories:
 
 @dataclass(frozen=True)
 class StepwiseRun:
-    """segments: one after the other. message: why it ended early, or "". evaluations: of the right-hand side."""
+    """Result of ``solve_stepwise``: segments, message of an early end or "", evaluations of the right-hand side."""
 
     model: MultiPhiModel
     segments: tuple[StepwiseSegment, ...]
@@ -73,11 +73,11 @@ class StepwiseRun:
 
     @property
     def steps(self) -> int:
-        """Steps accepted."""
+        """Number of accepted steps."""
         return sum(len(segment.solution.ts) - 1 for segment in self.segments)
 
     def histories(self, points: Sequence[str], time: np.ndarray) -> StepwiseHistories:
-        """Everything on ascending times (k,) [s], at an event the limit from the right."""
+        """Histories at ascending times (k,) [s], at an event the limit from the right."""
         base = self.model.base
         rows = np.array([base.modes.shapes.T @ self.model.structure.row(point) for point in points])
         rows = rows.reshape(len(points), base.modes.count)
@@ -85,10 +85,10 @@ class StepwiseRun:
         owner = np.searchsorted([segment.start for segment in self.segments], time, side="right") - 1
         for i in np.unique(owner):
             values[:, owner == i] = _of_segment(self.segments[i], rows, time[owner == i])
-        moved, gaps, forces, energy = np.split(values, np.cumsum([len(points)] + 2 * [len(base.contacts)]))
+        displacements, gaps, forces, energy = np.split(values, np.cumsum([len(points)] + 2 * [len(base.contacts)]))
         names = [contact.name for contact in base.contacts]
         return StepwiseHistories(
-            points=dict(zip(points, moved, strict=True)),
+            points=dict(zip(points, displacements, strict=True)),
             gaps=dict(zip(names, gaps, strict=True)),
             contact_force=dict(zip(names, forces, strict=True)),
             energy=energy[0],
@@ -130,7 +130,7 @@ def solve_stepwise(
 
 @dataclass(frozen=True)
 class _Integration:
-    """rule: of the contacts. method, rtol: of solve_ivp. size: of the start's displacement and velocity."""
+    """Integration with a rule of the contacts; method, rtol: of solve_ivp; size: of displacement and velocity."""
 
     rule: SpringRule
     method: str
@@ -138,34 +138,34 @@ class _Integration:
     size: tuple[float, float]
 
     def run(self, state: State, t_end: float) -> StepwiseRun:
-        """From ``state`` at t = 0, restarted in the next level after every event."""
+        """Integrate from ``state`` at t = 0, with a restart in the next level after every event."""
         segments: list[StepwiseSegment] = []
-        evaluations, message, time, most = 0, "", 0.0, UNSTABLE * (state.kinetic + state.potential)
+        evaluations, message, time, energy_limit = 0, "", 0.0, UNSTABLE * (state.kinetic + state.potential)
         while time < t_end and not message:
-            found, asking = self._segment(state, time, t_end)
+            found, requesting = self._segment(state, time, t_end)
             segments.append(StepwiseSegment(state.level, found.sol))
             evaluations, time, message = evaluations + found.nfev, float(found.t[-1]), self._failure(found, segments)
-            if asking and not message:
+            if requesting and not message:
                 modes = state.level.level.modes
-                reached = found.y[:, -1]
-                arrived = replace(state, displacement=reached[:modes], velocity=reached[modes:])
-                state, message = self._decided(arrived, asking, time, most)
+                end_state = found.y[:, -1]
+                before = replace(state, displacement=end_state[:modes], velocity=end_state[modes:])
+                state, message = self._after_event(before, requesting, time, energy_limit)
         return StepwiseRun(self.rule.model, tuple(segments), message, evaluations)
 
-    def _decided(self, state: State, asking: set[int], time: float, most: float) -> tuple[State, str]:
-        """State after an event, or the failure there; most: energy [J] beyond which a run is unstable."""
-        if not state.kinetic + state.potential <= most:
+    def _after_event(self, state: State, requesting: set[int], time: float, energy_limit: float) -> tuple[State, str]:
+        """State after an event, or the failure there; energy_limit: energy [J] beyond which a run is unstable."""
+        if not state.kinetic + state.potential <= energy_limit:
             return state, f"at t = {time:.9g} s: energy gained, the integration is unstable at this tolerance"
         try:
-            return self.rule.decide(state, self._together(state, asking, time)), ""
+            return self.rule.decide(state, self._simultaneous(state, requesting, time)), ""
         except NumericalFailure as failure:
             return state, f"at t = {time:.9g} s: {failure}"
 
     def _segment(self, state: State, time: float, t_end: float) -> tuple[Any, set[int]]:
-        """solve_ivp's result in one level, and the contacts that ask to change at its end."""
+        """Result of solve_ivp in one level, and the contacts that request a change at its end."""
         modes = state.level.level.modes
         motion, matrix = _right_hand_side(state.level)
-        watched = _watched(self.rule, state, time)
+        monitored = _monitored_events(self.rule, state, time)
         implicit: dict[str, Any] = {"jac": (lambda _, __: matrix) if self.method == "LSODA" else matrix}
         found = solve_ivp(
             motion,
@@ -173,16 +173,16 @@ class _Integration:
             np.concatenate([state.displacement, state.velocity]),
             method=self.method,
             dense_output=True,
-            events=[event for _, event in watched],
+            events=[event for _, event in monitored],
             rtol=self.rtol,
             atol=self.rtol * np.repeat(self.size, modes),
             **(implicit if self.method in ("Radau", "BDF", "LSODA") else {}),
         )
-        times = found.t_events if found.status == 1 else [()] * len(watched)
-        return found, {contact for (contact, _), at in zip(watched, times, strict=True) if len(at)}
+        times = found.t_events if found.status == 1 else [()] * len(monitored)
+        return found, {contact for (contact, _), at in zip(monitored, times, strict=True) if len(at)}
 
     def _failure(self, found: Any, segments: Sequence[StepwiseSegment]) -> str:
-        """Why the run cannot go on, or ""."""
+        """Reason why the run cannot continue, or ""."""
         time = float(found.t[-1])
         if found.status < 0:
             return f"at t = {time:.9g} s: {' '.join(str(found.message).split())}"
@@ -192,12 +192,12 @@ class _Integration:
             return f"at t = {time:.9g} s: chatter, {CHATTER} events within {CHATTER_PERIODS} periods of {highest:g} Hz"
         return ""
 
-    def _together(self, state: State, asking: set[int], time: float) -> set[int]:
-        """With those that reach zero at the same instant, as far as roots are resolved: solve_ivp leaves them out."""
-        found = set(asking)
+    def _simultaneous(self, state: State, requesting: set[int], time: float) -> set[int]:
+        """The contacts with those that solve_ivp omits as their signals are zero at the same instant."""
+        found = set(requesting)
         for contact, phase in enumerate(state.phases):
-            own, z = self.rule.signal(state.level, contact), np.concatenate([state.displacement, state.velocity])
-            value, rate = own.at(z), own.rate.at(z)
+            plain, z = self.rule.signal(state.level, contact), np.concatenate([state.displacement, state.velocity])
+            value, rate = plain.at(z), plain.rate.at(z)
             if phase is Phase.ARMED and rate < 0 and abs(value) <= -rate * INSTANT * (1 + time):
                 found.add(contact)
         return found
@@ -205,36 +205,36 @@ class _Integration:
 
 def _right_hand_side(level: LoadedLevel) -> tuple[Function, np.ndarray]:
     """z'(t, z) and its constant matrix (2 r, 2 r)."""
-    own = level.level
-    matrix = np.block([[np.zeros((own.modes,) * 2), np.eye(own.modes)], [-np.diag(own.omega**2), -own.damping]])
+    plain = level.level
+    matrix = np.block([[np.zeros((plain.modes,) * 2), np.eye(plain.modes)], [-np.diag(plain.omega**2), -plain.damping]])
     if not level.driven:
         return lambda _, z: matrix.dot(z), matrix
-    constant = np.concatenate([np.zeros(own.modes), level.asymptotic.drive])
+    constant = np.concatenate([np.zeros(plain.modes), level.asymptotic.drive])
     return lambda _, z: matrix.dot(z) + constant, matrix
 
 
-def _watched(rule: SpringRule, state: State, time: float) -> list[tuple[int, Function]]:
-    """(contact, event) of all that may ask to change: s falls through zero, s being as in the event rule.
+def _monitored_events(rule: SpringRule, state: State, time: float) -> list[tuple[int, Function]]:
+    """Pairs (contact, event) of all possible requests: s, as in the event rule, falls through zero.
 
-    A contact whose s is negative asks also where s turns down or, refused before, where s in the level it would
-    enter has risen to zero. ``time``: of the restart.
+    A contact with negative s also requests a change when s begins to fall, or after a refusal when s in the requested
+    level has risen to zero. time: of the restart.
     """
-    watched = []
+    monitored = []
     for contact, phase in enumerate(state.phases):
-        own = rule.signal(state.level, contact)
-        watched.append((contact, _falling(own, time, positive=phase is Phase.ARMED)))
+        plain = rule.signal(state.level, contact)
+        monitored.append((contact, _falling(plain, time, positive=phase is Phase.ARMED)))
         if phase is Phase.RECOVERING:
-            watched.append((contact, _falling(own.rate, time, while_negative=own)))
+            monitored.append((contact, _falling(plain.rate, time, while_negative=plain)))
         elif phase is Phase.REFUSED:
             entered = rule.entered_signal(state.level, contact)
-            watched.append((contact, _falling(-entered, time, while_negative=own)))
-    return watched
+            monitored.append((contact, _falling(-entered, time, while_negative=plain)))
+    return monitored
 
 
 def _falling(signal: Signal, time: float, *, positive: bool = True, while_negative: Signal | None = None) -> Function:
-    """Terminal event: ``signal`` falls through zero, looked for only while another one is negative.
+    """Terminal event: ``signal`` falls through zero, while the other signal, if given, is negative.
 
-    positive: its sign at the restart, where the value itself is round-off.
+    positive: whether the signal counts as positive at the restart, where its value is round-off.
     """
     vector, constant, first = signal.row, signal.constant, 1.0 if positive else -1.0
     if while_negative is None:
@@ -254,13 +254,13 @@ def _falling(signal: Signal, time: float, *, positive: bool = True, while_negati
 
 def _of_segment(segment: StepwiseSegment, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
     """Displacements of rows (p, m) in base coordinates, gaps, contact forces and energy, stacked, (p + 2 c + 1, k)."""
-    level, own = segment.level, segment.level.level
+    level, plain = segment.level, segment.level.level
     state = segment.solution(time)
-    displacement, velocity = state[: own.modes], state[own.modes :]
-    moved = (rows @ own.vectors) @ displacement + (rows @ level.asymptotic.configuration)[:, None]
-    gaps = own.gap_rows @ displacement + level.gap_constants[:, None]
+    displacement, velocity = state[: plain.modes], state[plain.modes :]
+    displacements = (rows @ plain.vectors) @ displacement + (rows @ level.asymptotic.configuration)[:, None]
+    gaps = plain.gap_rows @ displacement + level.gap_constants[:, None]
     forces = np.zeros_like(gaps)
-    closed = list(own.indices)
-    forces[closed] = -own.base.stiffnesses[closed, None] * gaps[closed]
+    closed = list(plain.indices)
+    forces[closed] = -plain.base.stiffnesses[closed, None] * gaps[closed]
     energy = 0.5 * np.sum(velocity**2, axis=0) + level.strain(displacement)
-    return np.vstack([moved, gaps, forces, energy])
+    return np.vstack([displacements, gaps, forces, energy])

@@ -1,4 +1,4 @@
-"""``multiphi-exudyn animate``: a scene's reduced model and its reference beside each other, as a GIF in slow motion."""
+"""``multiphi-exudyn animate``: a scene's reduced model and its reference in one animation, as a GIF in slow motion."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BAR_DELAY = 2.0  # s before a progress bar appears
 def run_animate(
     source: str, t_end: float | None, model: str | None, reference: str | None, slow: float | None, out: Path | None
 ) -> bool:
-    """Run two models of a scene and write the GIF; True if both of them ran, False, and no file, if one failed."""
+    """Run two models of a scene and write the GIF; return True if both ran, else False without a file."""
     scene = load_scene(source, t_end=t_end)
     stage = stage_of(scene, model, reference, slow)
     file = _file(out or Path(f"multiphi-{scene.name}") / "animation.gif")
@@ -42,7 +42,7 @@ def run_animate(
 
 
 def _file(path: Path) -> Path:
-    """The GIF to be written, in a folder there is."""
+    """Path of the GIF, in a folder that is created if necessary."""
     if path.suffix.lower() != ".gif" or path.is_dir():
         raise MultiPhiValueError(f"--out: got {str(path)!r}, need the name of a .gif file")
     return results_folder(path.parent) / path.name

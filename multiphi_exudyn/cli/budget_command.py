@@ -22,19 +22,19 @@ __all__ = ["run_budget"]
 
 
 def run_budget(source: str, t_end: float | None, modes: int | None, out: Path | None) -> bool:
-    """Run every rung of a scene's ladders and write budget.json and budget.png; True if no rung failed."""
+    """Run all models of a scene's error budget and write budget.json and budget.png; return True if none failed."""
     scene = load_scene(source, t_end=t_end, modes=modes)
     bench = prepare(scene, mechanics_of(scene))
     folder = results_folder(out or Path(f"multiphi-{scene.name}"))
     values = budget(bench, scene.file.modes, progress=sys.stderr.isatty()).values()
     write_whole(folder / "budget.json", json.dumps(values, indent=1).encode())
     write_whole(folder / "budget.png", png(budget_figure([values])))
-    _tell(values)
+    _print_summary(values)
     print(f"\n{folder / 'budget.png'}")
     return all(rung["status"] == "ok" for rung in values["rungs"].values())
 
 
-def _tell(values: dict[str, Any]) -> None:
+def _print_summary(values: dict[str, Any]) -> None:
     for name, rung in values["rungs"].items():
         if rung["status"] != "ok":
             print(f"{name}: {rung['status']}, {rung['message']}")
@@ -43,12 +43,12 @@ def _tell(values: dict[str, Any]) -> None:
         print(f"warning: {group.told(len(rungs))}")
     for window, ladders in values["windows"].items():
         for ladder, groups in ladders.items():
-            found = groups["all"]
+            total = groups["all"]
             print(f"\n{ladder} ladder, to {window} s, judged points together")
-            if found is None:
+            if total is None:
                 print("  fewer than two of its models ran")
                 continue
-            for part in found["parts"]:
+            for part in total["parts"]:
                 uncertainty = "unknown" if part["uncertainty"] is None else percent(part["uncertainty"])
                 print(f"  {part['cause']:40}  {percent(part['size']):>9}  uncertainty {uncertainty}")
-            print(f"  {'total':40}  {percent(found['total']):>9}")
+            print(f"  {'total':40}  {percent(total['total']):>9}")

@@ -29,7 +29,7 @@ __all__ = ["run_compare"]
 
 
 def run_compare(source: str, t_end: float | None, modes: int | None, out: Path | None) -> bool:
-    """Run every model of a scene and write report.html, summary.json and histories.npz; True if all of them ran."""
+    """Run every model of a scene and write report.html, summary.json and histories.npz; return True if all ran."""
     scene = load_scene(source, t_end=t_end, modes=modes)
     bench = prepare(scene, mechanics_of(scene))
     folder = results_folder(out or Path(f"multiphi-{scene.name}"))
@@ -45,12 +45,12 @@ def run_compare(source: str, t_end: float | None, modes: int | None, out: Path |
         bar.set_description("report")
         _write(comparison, folder)
         bar.update()
-    _tell(comparison, folder)
+    _print_summary(comparison, folder)
     return all(run.ok for run in comparison.runs.values())
 
 
 def _write(comparison: Comparison, folder: Path) -> None:
-    """Results first, the report last; each file appears whole or not at all."""
+    """Write the results first and the report last, without incomplete files."""
     arrays = io.BytesIO()
     np.savez_compressed(arrays, allow_pickle=False, **dict[str, Any](histories(comparison)))
     content = json.dumps(summary(comparison), indent=1, allow_nan=False)
@@ -60,7 +60,7 @@ def _write(comparison: Comparison, folder: Path) -> None:
     write_whole(folder / "report.html", page.encode())
 
 
-def _tell(comparison: Comparison, folder: Path) -> None:
+def _print_summary(comparison: Comparison, folder: Path) -> None:
     until = comparison.headline_window
     width = max(map(len, comparison.runs))
     print(f"{'model':{width}}  {'status':6}  {'online':>9}  {'faster':>10}  NRMSE to {until:g} s")

@@ -1,4 +1,4 @@
-"""``multiphi-exudyn compile``: pay the first compilation ahead, for a container or for the workers of a cluster."""
+"""``multiphi-exudyn compile``: compile in advance, for a container or for the workers of a cluster."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from multiphi_exudyn.time.simulate import simulate
 __all__ = ["run_compile"]
 
 
-USERS = (simulate, CreateMultiPhiBody)  # whose modules bring the entries that are compiled
+USERS = (simulate, CreateMultiPhiBody)  # their modules define the compiled functions
 
 
 def run_compile() -> bool:
-    """Compile what a run, and a body in Exudyn, would compile, and say where it is kept; True if it is kept."""
+    """Compile the functions of runs and of bodies in Exudyn, and print where they are stored; return True if so."""
     path = compile_entries() if available() else None
     if path is None:
         why = "no folder is writable; set NUMBA_CACHE_DIR to one that is" if available() else "numba is not installed"

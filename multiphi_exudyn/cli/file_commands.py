@@ -1,4 +1,4 @@
-"""``multiphi-exudyn new | validate | schema``: a scene or a study written, checked without a run, and its form."""
+"""``multiphi-exudyn new | validate | schema``: write or check a scene or a study file, or print its schema."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ KINDS: dict[str, tuple[str, type[BaseModel]]] = {
 
 
 def run_new(kind: str, path: Path | None) -> bool:
-    """Write a template that is valid as it is; of a study also the scene it names, where there is none."""
+    """Write a valid template; for a study also its scene, if the file does not exist."""
     path = path or Path(f"{kind}.toml")
-    beside = path.parent / "scene.toml"
+    scene = path.parent / "scene.toml"
     _write_template(kind, path)
-    if kind == "study" and not beside.exists():
-        _write_template("scene", beside)
+    if kind == "study" and not scene.exists():
+        _write_template("scene", scene)
     return True
 
 
 def run_validate(source: str) -> bool:
-    """Check a scene or a study, a file or shipped, as far as that goes without a run, and say what it has."""
+    """Check a scene or a study without a run, from a file or shipped, and print a summary of it."""
     file = Path(source)
     is_study = source in shipped_studies() or (file.is_file() and "scene" in read_toml(file))
     print(f"{source}: valid, {_of_study(load_study(source)) if is_study else _of_scene(source)}")
@@ -46,7 +46,7 @@ def run_validate(source: str) -> bool:
 
 
 def run_schema(kind: str, markdown: bool) -> bool:
-    """Print the JSON schema of a file's form, with which editors complete and check it, or its fields as a page."""
+    """Print the JSON schema of a file, for editors, or a page with its fields."""
     if markdown:
         print(file_reference(KINDS[kind][1], f"The fields of a {kind} file"))
         return True

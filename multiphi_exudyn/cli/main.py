@@ -3,11 +3,12 @@
     multiphi-exudyn compare | animate | budget | needs | study | stability | new | validate | schema | compile | scenes
                     | studies
 
-Exit code 0 if every model asked for ran, 1 if one failed, 2 for bad input, with one line on stderr. Of a study: 0 if
-all references and budgets, and at least one setting of every method, ran; settings that fail are rows with their cause.
-Of validate: 0 if the file is valid. Of stability: 0 if no case is wrong. Of compile: 0 if what is compiled is kept.
+Exit code 0 if every requested model ran, 1 if one failed, 2 for bad input, with one line on stderr. For a study: 0 if
+all references and budgets, and at least one setting of every method, ran; failed settings are rows with their cause.
+For validate: 0 if the file is valid. For stability: 0 if no case is wrong. For compile: 0 if the compiled code is
+stored.
 
-A command's own module is loaded when the command is run, so that ``--help`` answers at once.
+The module of a command is loaded when the command runs, so that ``--help`` is fast.
 """
 
 from __future__ import annotations
@@ -35,11 +36,11 @@ OK, FAILED, BAD_INPUT, INTERRUPTED, CLOSED_PIPE = 0, 1, 2, 130, 141
 
 
 def command() -> NoReturn:
-    """Entry of the installed command: ``main`` with one BLAS thread, unless the user has set the number.
+    """Entry point of the installed command: ``main`` with one BLAS thread, unless the user has set the number.
 
-    More threads cost the small matrices of a modal model more than they give. BLAS reads the number when it is loaded,
-    by the command that runs. A pipe that its reader has closed, as in ``multiphi-exudyn scenes | head -1``, ends the
-    command quietly.
+    With the small matrices of a modal model more threads are slower. BLAS reads the number when it is loaded, by the
+    command that runs. If the reader of a pipe has closed it, as in ``multiphi-exudyn scenes | head -1``, the command
+    ends without a message.
     """
     if not any(name in os.environ for name in THREAD_SETTINGS):
         os.environ.update(dict.fromkeys(THREAD_SETTINGS, "1"))
@@ -55,8 +56,8 @@ def command() -> NoReturn:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     try:
-        given = parser().parse_args(arguments)
-        return OK if given.run(given) else FAILED
+        options = parser().parse_args(arguments)
+        return OK if options.run(options) else FAILED
     except MultiPhiError as error:
         print(" ".join(str(error).split()), file=sys.stderr)
         return BAD_INPUT
@@ -66,22 +67,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 class _OneLineParser(argparse.ArgumentParser):
-    """A parser whose error is one line."""
+    """A parser with errors of one line."""
 
     def error(self, message: str) -> NoReturn:
-        """Exit with the one line."""
+        """Raise the error, as one line."""
         raise MultiPhiValueError(f"{self.prog}: {' '.join(message.split())}")
 
 
 def parser() -> argparse.ArgumentParser:
-    """All commands, their options and what each of them runs."""
-    whole = _OneLineParser(
+    """Parser of all commands with their options; ``run`` of its result is the function of the command."""
+    top_parser = _OneLineParser(
         "multiphi-exudyn",
         description="Structures with contacts: reduced models and the full nonlinear one, side by side.",
         epilog="multiphi-exudyn COMMAND --help says more about a command, with an example.",
     )
-    whole.add_argument("--version", action="version", version=f"multiphi-exudyn {__version__}")
-    commands = whole.add_subparsers(
+    top_parser.add_argument("--version", action="version", version=f"multiphi-exudyn {__version__}")
+    commands = top_parser.add_subparsers(
         dest="command",
         required=True,
         metavar="{compare,animate,budget,needs,study,stability,new,validate,schema,compile,scenes,studies}",
@@ -90,14 +91,14 @@ def parser() -> argparse.ArgumentParser:
     def add(
         name: str, run: Callable[[argparse.Namespace], bool], summary: str, text: str, example: str
     ) -> argparse.ArgumentParser:
-        one = commands.add_parser(
+        subparser = commands.add_parser(
             name,
             help=summary,
             description=f"{summary[0].upper()}{summary[1:]}. {text}".strip(),
             epilog=f"Example: multiphi-exudyn {example}",
         )
-        one.set_defaults(run=run)
-        return one
+        subparser.set_defaults(run=run)
+        return subparser
 
     compare = add(
         "compare",
@@ -183,82 +184,82 @@ def parser() -> argparse.ArgumentParser:
     )
     add("scenes", _scenes, "list the shipped scenes, which compare, animate, budget and needs take", "", "scenes")
     add("studies", _studies, "list the shipped studies, which study takes", "", "studies")
-    return whole
+    return top_parser
 
 
-def _compare(given: argparse.Namespace) -> bool:
+def _compare(options: argparse.Namespace) -> bool:
     from multiphi_exudyn.cli.compare_command import run_compare
 
-    return run_compare(given.scene, given.t_end, given.modes, given.out)
+    return run_compare(options.scene, options.t_end, options.modes, options.out)
 
 
-def _animate(given: argparse.Namespace) -> bool:
+def _animate(options: argparse.Namespace) -> bool:
     from multiphi_exudyn.cli.animate_command import run_animate
 
-    return run_animate(given.scene, given.t_end, given.model, given.reference, given.slow, given.out)
+    return run_animate(options.scene, options.t_end, options.model, options.reference, options.slow, options.out)
 
 
-def _budget(given: argparse.Namespace) -> bool:
+def _budget(options: argparse.Namespace) -> bool:
     from multiphi_exudyn.cli.budget_command import run_budget
 
-    return run_budget(given.scene, given.t_end, given.modes, given.out)
+    return run_budget(options.scene, options.t_end, options.modes, options.out)
 
 
-def _needs(given: argparse.Namespace) -> bool:
+def _needs(options: argparse.Namespace) -> bool:
     from multiphi_exudyn.cli.needs_command import run_needs
 
-    return run_needs(given.scenes)
+    return run_needs(options.scenes)
 
 
-def _study(given: argparse.Namespace) -> bool:
+def _study(options: argparse.Namespace) -> bool:
     from multiphi_exudyn.cli.study_command import run_study_file
 
-    return run_study_file(given.study, given.out, given.quick, given.on, given.workers)
+    return run_study_file(options.study, options.out, options.quick, options.on, options.workers)
 
 
-def _stability(given: argparse.Namespace) -> bool:
+def _stability(options: argparse.Namespace) -> bool:
     from multiphi_exudyn.cli.stability_command import run_stability
 
-    return run_stability(given.case, given.quick, given.out)
+    return run_stability(options.case, options.quick, options.out)
 
 
-def _new(given: argparse.Namespace) -> bool:
+def _new(options: argparse.Namespace) -> bool:
     from multiphi_exudyn.cli.file_commands import run_new
 
-    return run_new(given.kind, given.file)
+    return run_new(options.kind, options.file)
 
 
-def _validate(given: argparse.Namespace) -> bool:
+def _validate(options: argparse.Namespace) -> bool:
     from multiphi_exudyn.cli.file_commands import run_validate
 
-    return run_validate(given.file)
+    return run_validate(options.file)
 
 
-def _schema(given: argparse.Namespace) -> bool:
+def _schema(options: argparse.Namespace) -> bool:
     from multiphi_exudyn.cli.file_commands import run_schema
 
-    return run_schema(given.kind, given.markdown)
+    return run_schema(options.kind, options.markdown)
 
 
-def _compile(given: argparse.Namespace) -> bool:
+def _compile(options: argparse.Namespace) -> bool:
     from multiphi_exudyn.cli.compile_command import run_compile
 
     return run_compile()
 
 
-def _scenes(given: argparse.Namespace) -> bool:
+def _scenes(options: argparse.Namespace) -> bool:
     from multiphi_exudyn.study.scene.scenes import shipped_scenes
 
-    return _listed(shipped_scenes())
+    return _print_titles(shipped_scenes())
 
 
-def _studies(given: argparse.Namespace) -> bool:
+def _studies(options: argparse.Namespace) -> bool:
     from multiphi_exudyn.study.accuracy.cases import shipped_studies
 
-    return _listed(shipped_studies())
+    return _print_titles(shipped_studies())
 
 
-def _listed(titles: Mapping[str, str]) -> bool:
+def _print_titles(titles: Mapping[str, str]) -> bool:
     width = max(map(len, titles))
     for name, title in titles.items():
         print(f"{name:{width}}  {title}")

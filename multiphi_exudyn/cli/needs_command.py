@@ -1,4 +1,4 @@
-"""``multiphi-exudyn needs``: what the reduced run of a scene takes of what it could take."""
+"""``multiphi-exudyn needs``: levels, coordinates and memory of the reduced run of a scene."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ __all__ = ["run_needs"]
 
 
 def run_needs(sources: Sequence[str]) -> bool:
-    """Print a line for every scene, all shipped ones for none named; True if all of them ran."""
+    """Print a line for every scene, or for all shipped scenes without a name; return True if all ran."""
     scenes = [load_scene(source) for source in sources or shipped_scenes()]
-    found = [needs_of(scene) for scene in tqdm(scenes, disable=None, unit="scene")]
-    print(needs_table(found))
-    for group in grouped((needs.scene, needs.warnings) for needs in found):
-        print(f"warning: {group.told(len(found))}")
-    return all(needs.status == "ok" for needs in found)
+    all_needs = [needs_of(scene) for scene in tqdm(scenes, disable=None, unit="scene")]
+    print(needs_table(all_needs))
+    for group in grouped((needs.scene, needs.warnings) for needs in all_needs):
+        print(f"warning: {group.told(len(all_needs))}")
+    return all(needs.status == "ok" for needs in all_needs)

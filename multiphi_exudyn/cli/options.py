@@ -1,4 +1,4 @@
-"""Options of the commands, with their defaults, and the kinds of values they take; the folder of results."""
+"""Options of the commands, with their defaults and the types of their values; the folder of results."""
 
 from __future__ import annotations
 

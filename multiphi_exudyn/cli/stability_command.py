@@ -1,4 +1,4 @@
-"""``multiphi-exudyn stability``: every model through a catalogue of extreme cases."""
+"""``multiphi-exudyn stability``: run every model through a catalogue of extreme cases."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["run_stability"]
 
 
 def run_stability(name: str | None, quick: bool, out: Path | None) -> bool:
-    """Run the catalogue, or one case, and write report.html, summary.json and table.txt; True if no case is wrong."""
+    """Run the catalogue or one case, write report.html, summary.json and table.txt; return True if no case is wrong."""
     cases = chosen_cases(name, quick)
     folder = results_folder(out or Path(f"multiphi-stability{'-quick' if quick else ''}"))
     results = []

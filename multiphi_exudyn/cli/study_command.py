@@ -1,4 +1,4 @@
-"""``multiphi-exudyn study``: runs a study file, or goes on with it, and writes report, table and pictures."""
+"""``multiphi-exudyn study``: run or continue a study, and write its report, table and pictures."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ STORE = "runs.sqlite"
 
 
 def run_study_file(source: str, out: Path | None, quick: bool, where: str, workers: int | None) -> bool:
-    """Run a study into its folder; True if all references and budgets, and one setting of every method, ran."""
+    """Run a study in its folder; return True if all references, all budgets and a setting of every method ran."""
     study = load_study(source, quick=quick)
     folder = results_folder(out or Path(f"multiphi-{study.name}{'-quick' if quick else ''}"))
     with Store(folder / STORE) as store, open_executor(where, workers) as executor:
         result = run_study(study, store, executor, progress=sys.stderr.isatty())
     write_whole(folder / TABLE, csv_text(result).encode())
     write_whole(folder / "report.html", render_study(result).encode())
-    _tell(result, folder)
+    _print_summary(result, folder)
     return _complete(result)
 
 
@@ -44,15 +44,15 @@ def _complete(result: StudyResult) -> bool:
     return references and budgets and {method.name for method in result.study.methods} <= ran
 
 
-def _tell(result: StudyResult, folder: Path) -> None:
-    """The cheapest setting of every method for every tolerance, at the first point of the axes, if it was timed."""
-    places = points(result) if result.rows else [{}]
-    at = places[0]
-    first = f", at the first of {len(places)} points: {words(at)}" if at else ""
-    known = [setting for setting in settings(result) if setting.at == at]
+def _print_summary(result: StudyResult, folder: Path) -> None:
+    """Print the cheapest setting of every method for every tolerance, at the first point of the axes, if timed."""
+    all_points = points(result) if result.rows else [{}]
+    at = all_points[0]
+    first = f", at the first of {len(all_points)} points: {words(at)}" if at else ""
+    settings_here = [setting for setting in settings(result) if setting.at == at]
     full = full_methods_of(result)
     for tolerance in result.study.tolerances if result.timings else ():
-        chosen = cheapest(known, tolerance)
+        chosen = cheapest(settings_here, tolerance)
         faster = times_faster(chosen, full)
         print(f"\ncheapest within {share(tolerance)} (NRMSE to {result.window:g} s){first}")
         print(f"  {'method':32}  {'online':>9}  {'faster':>12}  {'error':>8}  setting")

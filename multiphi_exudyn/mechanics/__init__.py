@@ -1,4 +1,4 @@
-"""Mechanics: what a user describes: a structure, its contacts, friction and force laws, and the loads on it.
+"""Mechanics: the description of a structure, its contacts, friction and force laws, and the loads on it.
 
 A structure is M, C, K and named points, given as matrices or by its modes, read from files, built as a beam, or
 assembled from others. Nothing is reduced or solved here.

@@ -1,4 +1,4 @@
-"""Arguments: what counts as a real number, arrays of real numbers from what a user gives, and names there are."""
+"""Arguments of users: real numbers, arrays of real numbers, and the names that an error lists."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ __all__ = ["FLOAT", "Matrix", "did_you_mean", "is_real", "no_text", "one_of", "r
 Matrix: TypeAlias = Any  # (n, n) numpy array or scipy.sparse array
 
 FLOAT = np.dtype(float)
-REAL_KINDS = "biufO"  # numpy's codes of what may be converted: numbers, and objects that know how
+REAL_KINDS = "biufO"  # numpy's codes of types that may be converted: numbers, and objects with a conversion
 SHOWN = 12  # names that an error lists
 
 
 def is_real(value: Any) -> bool:
-    """True for a Python or numpy number that a float can hold and that is neither complex nor a truth value."""
+    """True for a Python or numpy number that a float can represent, and that is neither complex nor a boolean."""
     if isinstance(value, int):
         return not isinstance(value, bool) and abs(value) <= sys.float_info.max
     return isinstance(value, (float, np.integer, np.floating))
 
 
 def real_array(name: str, given: Any, needed: str) -> Matrix:
-    """A copy of ``given`` as real numbers, sparse if it is; text and complex numbers are not converted."""
+    """A copy of ``given`` as real numbers, sparse if ``given`` is; raise for text and complex numbers."""
     if type(given) is np.ndarray and given.dtype == FLOAT:
         return given.copy("K")
     if scipy.sparse.issparse(given) and given.dtype.kind in REAL_KINDS:
@@ -44,15 +44,15 @@ def real_array(name: str, given: Any, needed: str) -> Matrix:
 
 
 def no_text(name: str, given: object) -> None:
-    """Refuses a name where several are needed: it would be taken letter by letter."""
+    """Raise for a string where a sequence of names is needed, as it would be read letter by letter."""
     if isinstance(given, str):
         raise MultiPhiTypeError(f"{name}: got {given!r}, need a sequence, as [{given!r}]")
 
 
 def one_of(given: object, known: Iterable[object], what: str = "") -> str:
-    """What an error needs in place of an unknown name: "one of: a, b", and the name that may have been meant.
+    """Text for an error about an unknown name: "one of: a, b", and the most similar name.
 
-    what: of what they are, for "one of the points: a, b".
+    what: kind of the names, for "one of the points: a, b".
     """
     names = [str(name) for name in known]
     listed = ", ".join(names[:SHOWN]) or "none"
@@ -61,6 +61,6 @@ def one_of(given: object, known: Iterable[object], what: str = "") -> str:
 
 
 def did_you_mean(given: object, known: Iterable[str]) -> str:
-    """The known name nearest to what was given, as the end of a sentence; "" where none is near."""
-    near = difflib.get_close_matches(str(given), list(known), n=1)
-    return f"; did you mean {near[0]!r}?" if near else ""
+    """The most similar known name, as the end of a sentence; "" if none is similar."""
+    similar = difflib.get_close_matches(str(given), list(known), n=1)
+    return f"; did you mean {similar[0]!r}?" if similar else ""

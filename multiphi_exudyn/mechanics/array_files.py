@@ -4,8 +4,8 @@
 .mat    MATLAB to version 7 by scipy; version 7.3 is HDF5, for which h5py is needed: the extra ``matlab``
 .op4    Nastran OUTPUT4, text or binary, dense or sparse, by pyYeti: the extra ``nastran``
 
-Which array is meant is said, (file, name), or clear: the only one, or among the largest square ones the only one whose
-name begins as the field's own names do: M for mass; K for stiffness; C, D or B for damping.
+The array is selected by (file, name). Without a name it is the only array, or among the largest square ones the only
+one with a usual initial: M for mass; K for stiffness; C, D or B for damping.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ import scipy.sparse
 
 from multiphi_exudyn.mechanics.arguments import Matrix, one_of
 
-__all__ = ["ARRAY_READERS", "chosen", "npz_arrays"]
+__all__ = ["ARRAY_READERS", "npz_arrays", "select_array"]
 
 INITIALS = {"mass": ("m",), "stiffness": ("k", "stif"), "damping": ("c", "d", "b")}
 NUMBERS = "biufc"  # numpy's codes of numbers
 HDF5 = b"\x89HDF"
-HDF5_AT = (0, 512)  # bytes into the file: MATLAB writes 512 of its own first
+HDF5_AT = (0, 512)  # offsets in bytes: MATLAB writes 512 bytes before
 
 
 def npz_arrays(path: Path) -> dict[str, Matrix]:
@@ -34,7 +34,7 @@ def npz_arrays(path: Path) -> dict[str, Matrix]:
         arrays = dict(stored)
     if "format" not in arrays:
         return arrays
-    return {"matrix": _checked(scipy.sparse.load_npz(path))}
+    return {"matrix": _with_valid_indices(scipy.sparse.load_npz(path))}
 
 
 def mat_arrays(path: Path) -> dict[str, Matrix]:
@@ -43,8 +43,7 @@ def mat_arrays(path: Path) -> dict[str, Matrix]:
         head = file.read(HDF5_AT[-1] + len(HDF5))
     if any(head[at:].startswith(HDF5) for at in HDF5_AT):
         return _mat_73_arrays(path)
-    found = scipy.io.loadmat(path, appendmat=False)
-    return _matrices(found)
+    return _matrices(scipy.io.loadmat(path, appendmat=False))
 
 
 def _mat_73_arrays(path: Path) -> dict[str, Matrix]:
@@ -56,8 +55,8 @@ def _mat_73_arrays(path: Path) -> dict[str, Matrix]:
         )
         raise ValueError(needed) from error
     with h5py.File(path, "r") as file:
-        kept = {name: item for name, item in file.items() if not name.startswith("#")}
-        arrays = {name: _hdf5_array(item) for name, item in kept.items()}
+        variables = {name: item for name, item in file.items() if not name.startswith("#")}
+        arrays = {name: _hdf5_array(item) for name, item in variables.items()}
     return _matrices(arrays)
 
 
@@ -68,15 +67,15 @@ def _hdf5_array(item: Any) -> Any:
     if "MATLAB_sparse" not in item.attrs:
         return None
     pointers = np.asarray(item["jc"]).astype(np.int64)
-    data, places = (np.asarray(item[name]) if name in item else np.zeros(0) for name in ("data", "ir"))
+    data, rows = (np.asarray(item[name]) if name in item else np.zeros(0) for name in ("data", "ir"))
     shape = (int(item.attrs["MATLAB_sparse"]), len(pointers) - 1)
-    return scipy.sparse.csc_array((data, places.astype(np.int64), pointers), shape=shape)
+    return scipy.sparse.csc_array((data, rows.astype(np.int64), pointers), shape=shape)
 
 
 def op4_arrays(path: Path) -> dict[str, Matrix]:
-    """All matrices of a Nastran OUTPUT4 file by name, in small letters."""
+    """All matrices of a Nastran OUTPUT4 file by name, in lower case."""
     try:
-        with np.printoptions():  # which importing pyYeti changes, for everybody
+        with np.printoptions():  # which the import of pyYeti changes globally
             from pyyeti.nastran import op4
     except ImportError as error:
         raise ValueError("pyYeti is needed for it (pip install 'multiphi-exudyn[nastran]')") from error
@@ -84,32 +83,32 @@ def op4_arrays(path: Path) -> dict[str, Matrix]:
     return arrays
 
 
-def chosen(name: str, arrays: Mapping[str, Matrix], wanted: str | None) -> Matrix:
-    """The array that is wanted, or the one that ``name`` ("mass", "stiffness", "damping") can only mean."""
-    if wanted is not None:
-        if wanted not in arrays:
-            raise ValueError(f"it has no array {wanted!r}, need {one_of(wanted, arrays)}")
-        return arrays[wanted]
+def select_array(name: str, arrays: Mapping[str, Matrix], array_name: str | None) -> Matrix:
+    """The array ``array_name``, or for None the only candidate for ``name`` ("mass", "stiffness" or "damping")."""
+    if array_name is not None:
+        if array_name not in arrays:
+            raise ValueError(f"it has no array {array_name!r}, need {one_of(array_name, arrays)}")
+        return arrays[array_name]
     if len(arrays) == 1:
         return next(iter(arrays.values()))
     square = {key: array.shape[0] for key, array in arrays.items() if array.ndim == 2 and len({*array.shape}) == 1}
-    meant = [
+    candidates = [
         key for key, n in square.items() if n == max(square.values()) and key.lower().startswith(INITIALS.get(name, ()))
     ]
-    if len(meant) != 1:
+    if len(candidates) != 1:
         raise ValueError(f"it holds the arrays {', '.join(arrays) or 'none'}: say which, (file, name)")
-    return arrays[meant[0]]
+    return arrays[candidates[0]]
 
 
-def _matrices(found: Mapping[str, Any]) -> dict[str, Matrix]:
-    """What of all that is found are matrices of numbers."""
-    dense = {name: array for name, array in found.items() if isinstance(array, np.ndarray)}
-    sparse = {name: _checked(array) for name, array in found.items() if scipy.sparse.issparse(array)}
+def _matrices(arrays: Mapping[str, Any]) -> dict[str, Matrix]:
+    """Those arrays that are numeric matrices."""
+    dense = {name: array for name, array in arrays.items() if isinstance(array, np.ndarray)}
+    sparse = {name: _with_valid_indices(array) for name, array in arrays.items() if scipy.sparse.issparse(array)}
     return {name: array for name, array in dense.items() if array.dtype.kind in NUMBERS} | sparse
 
 
-def _checked(matrix: Matrix) -> Matrix:
-    """A sparse matrix whose indices are inside of its shape; others are read as addresses."""
+def _with_valid_indices(matrix: Matrix) -> Matrix:
+    """The sparse matrix; raise for indices outside its shape, which would be read as addresses."""
     if hasattr(matrix, "check_format"):
         matrix.check_format(full_check=True)
     return matrix

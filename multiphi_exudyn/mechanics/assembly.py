@@ -1,10 +1,10 @@
-"""Several structures as one: side by side, tied to each other or to the ground.
+"""Assembly of several structures into one: side by side, tied to each other or to the ground.
 
     M = T^T blockdiag(M_a, M_b, ...) T,   K and C alike,   (x_a, x_b, ...) = T z,   G T = 0
 
-A *tie* is a linear combination of points that is held at zero, one row of G (t, N); T (N, N - t) solves the ties for t
-of the N displacements of the parts, so they hold exactly and need neither multipliers nor stiffness. z [m, rad] are the
-displacements that are left. The point "tip" of the part "a" is "a.tip" of the assembly.
+A *tie* is a linear combination of points that is kept at zero, one row of G (t, N). T (N, N - t) solves the ties for t
+of the N displacements of the parts, so the ties are exact without multipliers or stiffness. z [m, rad] are the other
+displacements. The point "tip" of the part "a" is "a.tip" of the assembly.
 """
 
 from __future__ import annotations
@@ -24,27 +24,27 @@ from multiphi_exudyn.mechanics.structure import LinearStructure, damping_matrix
 
 __all__ = ["Assembly", "Tie", "assemble"]
 
-Tie = Mapping[str, float]  # {point: coefficient, ...}, their sum held at zero
+Tie = Mapping[str, float]  # {point: coefficient, ...}, whose sum is kept at zero
 
-DEPENDENT = 1e-10  # of a tie's largest coefficient: what elimination leaves of one that follows from the others
-TIES_HOLD = 1e-9  # of the terms of a tie: above the round-off of displacements computed part by part
+DEPENDENT = 1e-10  # of a tie's largest coefficient: round-off of the elimination of a tie that follows from others
+TIES_HOLD = 1e-9  # of the terms of a tie: larger than the round-off of displacements computed part by part
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Assembly(LinearStructure):
-    """One structure made of parts, tied to each other or to the ground; made by ``assemble``.
+    """One structure of several parts, tied to each other or to the ground; the result of ``assemble``.
 
         M = T^T blockdiag(M_a, M_b, ...) T,   K and C alike,   (x_a, x_b, ...) = T z,   G T = 0
 
-    It is a LinearStructure in z, those of the N displacements of the parts that the t ties leave free; the point "tip"
+    It is a LinearStructure in z, the displacements of the parts that are not eliminated by the t ties; the point "tip"
     of the part "a" is "a.tip".
 
     Attributes
     ----------
     mass, stiffness : array (n, n)
-        M [kg, kg m2] and K [N/m, N m], sparse if those of any part are.
+        M [kg, kg m2] and K [N/m, N m], sparse if any part is.
     damping : array (n, n), ModalDamping, RayleighDamping or None
-        C [N s/m, N m s], or how it is made.
+        C [N s/m, N m s], or its definition by ratios.
     points : mapping of str to array (n,)
         Rows of the parts' points in z.
     dofs : None
@@ -56,7 +56,7 @@ class Assembly(LinearStructure):
     transformation : sparse array (N, n)
         T.
     free : array (n,)
-        Which of the N displacements z are.
+        Indices of z among the N displacements.
 
     Examples
     --------
@@ -88,22 +88,22 @@ class Assembly(LinearStructure):
         if name not in self.parts:
             raise MultiPhiValueError(f"part: got {name!r}, need one of: {', '.join(self.parts)}")
         first, after = self.parts[name]
-        given = real_array("displacement", displacement, f"an ({self.n},) or ({self.n}, k) array of real numbers")
-        if given.ndim not in (1, 2) or given.shape[0] != self.n:
-            raise MultiPhiValueError(f"displacement: got shape {given.shape}, need ({self.n},) or ({self.n}, k)")
-        return np.asarray(self.transformation[first:after] @ given)
+        values = real_array("displacement", displacement, f"an ({self.n},) or ({self.n}, k) array of real numbers")
+        if values.ndim not in (1, 2) or values.shape[0] != self.n:
+            raise MultiPhiValueError(f"displacement: got shape {values.shape}, need ({self.n},) or ({self.n}, k)")
+        return np.asarray(self.transformation[first:after] @ values)
 
     def together(self, displacements: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Displacements (or velocities) of the assembly, (n,), from those of its parts, (n_a,) each; absent ones rest.
+        """Displacements (or velocities) of the assembly (n,) from those of its parts (n_a,); zero for other parts.
 
-        MultiPhiValueError where they break a tie, and for a part that there is not.
+        MultiPhiValueError if they violate a tie, and for a part that does not exist.
         """
         united = np.zeros(self.ties.shape[1])
-        for name, given in _mapping("displacements", displacements).items():
+        for name, values in _mapping("displacements", displacements).items():
             if name not in self.parts:
                 raise MultiPhiValueError(f"displacements: got part {name!r}, need one of: {', '.join(self.parts)}")
             first, after = self.parts[name]
-            united[first:after] = _finite(f"displacements[{name!r}]", given, after - first)
+            united[first:after] = _finite(f"displacements[{name!r}]", values, after - first)
         _check_ties_hold(self.ties, united)
         return united[self.free]
 
@@ -113,22 +113,22 @@ def assemble(
     ties: Sequence[Tie] = (),
     damping: Matrix | ModalDamping | RayleighDamping | None = None,
 ) -> Assembly:
-    """One structure out of several, side by side, tied to each other or to the ground.
+    """Assemble several structures into one, side by side, tied to each other or to the ground.
 
         M = T^T blockdiag(M_a, M_b, ...) T,   K and C alike,   (x_a, x_b, ...) = T z,   G T = 0
 
-    A tie is a linear combination of points that is held at zero, one row of G. T solves the ties for as many
-    displacements, so they hold exactly and need neither multipliers nor stiffness.
+    A tie is a linear combination of points that is kept at zero, one row of G. T solves the ties for as many
+    displacements, so they are exact without multipliers or stiffness.
 
     Parameters
     ----------
     parts : mapping of str to LinearStructure
         By names without a dot; the point "tip" of the part "a" becomes "a.tip".
     ties : sequence of mapping, default ()
-        Each {point: coefficient, ...}, a sum that is held at zero: {"a.tip": 1.0, "b.tip": -1.0} ties two points,
+        Each {point: coefficient, ...}, a sum that is kept at zero: {"a.tip": 1.0, "b.tip": -1.0} ties two points,
         {"a.tip": 1.0} one to the ground.
     damping : array (n, n), ModalDamping, RayleighDamping or None, default None
-        None keeps what the parts have; anything else takes its place, ratios being of the modes of the assembly.
+        None keeps the damping of the parts; anything else replaces it, with ratios of the modes of the assembly.
 
     Returns
     -------
@@ -138,10 +138,10 @@ def assemble(
     Raises
     ------
     MultiPhiTypeError
-        For parts that are no structures, and ties that are no mappings.
+        For parts that are not structures, and ties that are not mappings.
     MultiPhiValueError
-        For no parts, names with a dot, unknown points, ties that follow from one another or hold everything, and ratios
-        of a sparse part.
+        For no parts, names with a dot, unknown points, ties that follow from one another or leave no displacement free,
+        and ratios of a sparse part.
 
     Examples
     --------
@@ -158,10 +158,10 @@ def assemble(
     _check_parts(parts)
     united = _side_by_side(parts)
     rows = _tie_rows(united, ties)
-    transformation, free = _solved(rows)
+    transformation, free = _elimination(rows)
     return Assembly(
-        mass=_between(united.mass, transformation),
-        stiffness=_between(united.stiffness, transformation),
+        mass=_project(united.mass, transformation),
+        stiffness=_project(united.stiffness, transformation),
         damping=_damping(parts, transformation) if damping is None else damping,
         points={name: transformation.T @ row for name, row in united.points.items()},
         parts=_spans(parts),
@@ -202,17 +202,17 @@ def _blocks(matrices: Sequence[Matrix]) -> Matrix:
     return united if any(map(scipy.sparse.issparse, matrices)) else united.toarray()
 
 
-def _between(matrix: Matrix, transformation: Matrix) -> Matrix:
+def _project(matrix: Matrix, transformation: Matrix) -> Matrix:
     return transformation.T @ matrix @ transformation
 
 
 def _damping(parts: Mapping[str, LinearStructure], transformation: Matrix) -> Matrix | None:
-    """C of the parts' own damping, None if no part has any."""
-    own = {name: _damping_of(name, part) for name, part in parts.items()}
-    if all(matrix is None for matrix in own.values()):
+    """C of the parts' damping, None if no part has any."""
+    matrices = {name: _damping_of(name, part) for name, part in parts.items()}
+    if all(matrix is None for matrix in matrices.values()):
         return None
-    filled = [0 * part.mass if own[name] is None else own[name] for name, part in parts.items()]
-    return _between(_blocks(filled), transformation)
+    blocks = [0 * part.mass if matrices[name] is None else matrices[name] for name, part in parts.items()]
+    return _project(_blocks(blocks), transformation)
 
 
 def _damping_of(name: str, part: LinearStructure) -> Matrix | None:
@@ -234,16 +234,16 @@ def _tie_rows(united: LinearStructure, ties: Any) -> np.ndarray:
     return rows
 
 
-def _solved(ties: np.ndarray) -> tuple[Matrix, np.ndarray]:
-    """T (N, N - t) sparse and which displacements are left, by Gauss-Jordan elimination with complete pivoting."""
+def _elimination(ties: np.ndarray) -> tuple[Matrix, np.ndarray]:
+    """T (N, N - t), sparse, and the indices of z, by Gauss-Jordan elimination with complete pivoting."""
     scale = np.max(np.abs(ties), axis=1, keepdims=True, initial=0.0)
     rows = ties / np.where(scale > 0, scale, 1.0)
     count, total = rows.shape
     pivots = np.full(count, -1)
     for _ in range(count):
-        waiting = np.flatnonzero(pivots < 0)
-        i, j = np.unravel_index(np.argmax(np.abs(rows[waiting])), (len(waiting), total))
-        row = waiting[i]
+        remaining = np.flatnonzero(pivots < 0)
+        i, j = np.unravel_index(np.argmax(np.abs(rows[remaining])), (len(remaining), total))
+        row = remaining[i]
         if abs(rows[row, j]) < DEPENDENT:
             raise MultiPhiValueError(f"ties[{row}]: follows from the others, need ties independent of each other")
         pivots[row] = j
@@ -253,30 +253,30 @@ def _solved(ties: np.ndarray) -> tuple[Matrix, np.ndarray]:
     free = np.setdiff1d(np.arange(total), pivots)
     if not len(free):
         raise MultiPhiValueError(f"ties: got {count}, which hold every degree of freedom, need fewer")
-    solved = scipy.sparse.coo_array(-rows[:, free])
-    entries = np.r_[np.ones(len(free)), solved.data]
-    places = np.r_[free, pivots[solved.row]], np.r_[np.arange(len(free)), solved.col]
-    return scipy.sparse.csr_array((entries, places), shape=(total, len(free))), free
+    eliminated = scipy.sparse.coo_array(-rows[:, free])
+    entries = np.r_[np.ones(len(free)), eliminated.data]
+    indices = np.r_[free, pivots[eliminated.row]], np.r_[np.arange(len(free)), eliminated.col]
+    return scipy.sparse.csr_array((entries, indices), shape=(total, len(free))), free
 
 
 def _check_ties_hold(ties: np.ndarray, united: np.ndarray) -> None:
-    """Each tie against the size of its own terms."""
-    broken = np.abs(ties @ united) > TIES_HOLD * (np.abs(ties) @ np.abs(united))
-    if np.any(broken):
-        worst = int(np.argmax(broken))
+    """Raise for a tie that is not zero, relative to its terms."""
+    violated = np.abs(ties @ united) > TIES_HOLD * (np.abs(ties) @ np.abs(united))
+    if np.any(violated):
+        worst = int(np.argmax(violated))
         raise MultiPhiValueError(
             f"displacements: got {ties[worst] @ united:g} for ties[{worst}], need displacements that make it 0"
         )
 
 
-def _finite(name: str, given: Any, n: int) -> np.ndarray:
-    vector = np.asarray(real_array(name, given, f"an ({n},) array of real numbers"))
+def _finite(name: str, values: Any, n: int) -> np.ndarray:
+    vector = np.asarray(real_array(name, values, f"an ({n},) array of real numbers"))
     if vector.shape != (n,) or not np.all(np.isfinite(vector)):
         raise MultiPhiValueError(f"{name}: got shape {vector.shape}, need ({n},) finite numbers")
     return vector
 
 
-def _mapping(name: str, given: Any) -> Mapping[str, Any]:
-    if not isinstance(given, Mapping):
-        raise MultiPhiTypeError(f"{name}: got {type(given).__name__}, need a mapping by name")
-    return given
+def _mapping(name: str, values: Any) -> Mapping[str, Any]:
+    if not isinstance(values, Mapping):
+        raise MultiPhiTypeError(f"{name}: got {type(values).__name__}, need a mapping by name")
+    return values

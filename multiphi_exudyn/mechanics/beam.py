@@ -1,4 +1,4 @@
-"""A straight planar beam as it is described: sections, point masses, a clamp and named points."""
+"""Description of a straight planar beam: sections, point masses, a clamp and named points."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class PointMass:
     Parameters
     ----------
     at : float
-        Where along the beam [m].
+        Position along the beam [m].
     mass : float
         m [kg], >= 0.
     inertia : float, default 0.0
@@ -33,7 +33,7 @@ class PointMass:
     Raises
     ------
     MultiPhiTypeError
-        For what are no numbers.
+        For values that are not numbers.
     MultiPhiValueError
         For values that are negative or not finite.
 
@@ -70,7 +70,7 @@ class Clamp:
     Raises
     ------
     MultiPhiTypeError
-        For what are no numbers.
+        For values that are not numbers.
     MultiPhiValueError
         For negative values.
 
@@ -99,11 +99,11 @@ class Beam:
     Parameters
     ----------
     sections : sequence of Section
-        Pieces that follow each other without a gap.
+        Adjacent sections, without a gap between them.
     points : mapping of str to float, default empty
         Name to position x [m] along the beam.
     masses : sequence of PointMass, default ()
-        Fixed to the beam.
+        Masses fixed to the beam.
     clamp : Clamp, default rigid
         Support of the first end.
 
@@ -142,9 +142,9 @@ class Beam:
                 raise MultiPhiValueError(
                     f"sections: one ends at {left.end:g} m, the next starts at {right.start:g} m; need no gap"
                 )
-        places = {f"points[{name!r}]": x for name, x in self.points.items()}
-        places |= {f"point mass {i}": mass.at for i, mass in enumerate(self.masses)}
-        for name, x in places.items():
+        positions = {f"points[{name!r}]": x for name, x in self.points.items()}
+        positions |= {f"point mass {i}": mass.at for i, mass in enumerate(self.masses)}
+        for name, x in positions.items():
             if not self.start <= x <= self.end:
                 raise MultiPhiValueError(f"{name}: got x = {x!r} m, need {self.start:g} <= x <= {self.end:g}")
 
@@ -164,7 +164,7 @@ class Beam:
         return self.end - self.start
 
     def section_at(self, x: float) -> Section:
-        """The section that holds x [m] (at a boundary: the one behind it)."""
+        """Section at x [m]; at a boundary the section that begins there."""
         return next((s for s in self.sections if x < s.end), self.sections[-1])
 
 

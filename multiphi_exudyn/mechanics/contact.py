@@ -1,43 +1,43 @@
-"""Unilateral contact: a gap that may not close further than zero, or only against a stiffness.
+"""Unilateral contact: a gap that cannot become negative, or only against a stiffness.
 
     g(x) = h.x + gap,   open where g > 0;   the contact force lambda >= 0 [N] acts along +h.
 
-    rigid      0 <= lambda, g >= 0, lambda g = 0, and where it strikes with g'- < 0: g'+ >= -e g'-  (Moreau)
+    rigid      0 <= lambda, g >= 0, lambda g = 0, and g'+ >= -e g'- in an impact with g'- < 0  (Moreau)
     compliant  lambda = k max(0, -g)
     viscous    lambda = max(0, k (-g) + c (-g')) where g < 0, else 0
 
-A viscous contact closes when its gap falls through zero and opens when its force returns to zero, which is before its
-gap does: it never pulls. Inside its stop it closes again when k (-g) + c (-g') rises through zero. What its damper
-takes is damping work, and so is the strain k g^2 / 2 that it still holds where it opens inside (the damper takes that
-while the spring relaxes), less what it holds where it closes again inside.
+A viscous contact closes when its gap falls through zero, and opens when its force falls to zero, which is before the
+gap returns to zero: it never pulls. Within the stop it closes again when k (-g) + c (-g') rises through zero. The
+damping work includes the strain energy k g^2 / 2 that is left when the contact opens within the stop (the damper
+dissipates it while the spring relaxes), less the strain energy when it closes again there.
 
-Friction. Where a closed contact slides along h_t, with the force N = lambda,
+Friction. For a closed contact that can slide along h_t, with the force N = lambda,
 
     stick   T = k_t (h_t.x - v_t t - w), without a spring h_t.x - v_t t = w and T its reaction,   |T| <= mu_s N
     slip    T = s mu N,   s (h_t.x' - v_t - T' / k_t) >= 0,   s = +1 or -1
 
-The force on the structure is h N - h_t T. A contact that closes sticks where it is hit, or without a spring slides in
-the direction in which it moves; one that opens has T = 0.
+The force on the structure is h N - h_t T. A contact that closes begins to stick at its position, or without a spring
+slides in the direction of its velocity; one that opens has T = 0.
 
-A rigid contact that strikes has an impulse p along h, and q along -h_t, of all that touch together (Moreau):
+In an impact, a rigid contact has the impulse p along h, and q along -h_t, for all contacts that touch (Moreau):
 
     |q| <= mu p,   h_t.x'+ = v_t where it is smaller,   s (h_t.x'+ - v_t) >= 0 where q = s mu p
 
-mu_s has no part in it. With e = 0 an impact only takes energy. With e > 0 where one that touches rubs, g'+ >= -e g'-
-might make some (T. R. Kane). There e is Poisson's: an impact with e = 0, of impulses p, and then one of at least e p,
-g'+ >= 0, again with friction; with one e it takes energy, too. Where sliding has no unique motion the level is refused
-with its number (levels/sliding.py).
+mu_s is not used in impacts. With e = 0 an impact dissipates energy. With e > 0 and friction, g'+ >= -e g'- might
+generate energy (T. R. Kane). Then e is Poisson's: an impact with e = 0 and impulses p, followed by one with impulses of
+at least e p and g'+ >= 0, again with friction; with the same e for all contacts it dissipates energy, too. A level in
+which sliding has no unique motion is refused with its number (levels/sliding.py).
 
-    normal            friction without a spring    with a spring k_t                     restitution beside friction
-    compliant         works                        works                                 refused, as without friction
-    viscous           works                        refused: slip ends by N', which has   refused, as without friction
-                                                   an acceleration
-    rigid             works                        refused: so has N' of a reaction      works, by Poisson's law
-    force law         has none: a law is no contact, and has no N
+    normal            friction without a spring    with a spring k_t                     restitution and friction
+    compliant         possible                     possible                              refused, as without friction
+    viscous           possible                     refused: the end of slip depends on   refused, as without friction
+                                                   N', which contains an acceleration
+    rigid             possible                     refused: so does N' of a reaction     possible, by Poisson's law
+    force law         impossible: a law is not a contact, and has no N
 
-What works does so in runs, steady states, frequency responses, static equilibria, and in the Exudyn body, alone and
-with an interface (there without a moving counter-surface). Where static friction is above the kinetic one, a spring
-that lets go while the pressure falls faster than it relaxes sticks again at once, at mu N.
+The possible combinations hold for runs, steady states, frequency responses, static equilibria, and the Exudyn body,
+alone and with an interface (there without a moving counter-surface). With static friction above the kinetic one, a
+spring that begins to slip while the pressure falls faster than it relaxes sticks again at once, at mu N.
 
 Sources: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM 302 (1988); Ch. Glocker,
 F. Pfeiffer, Multiple impacts with friction in rigid multibody systems, Nonlinear Dynamics 7 (1995).
@@ -73,26 +73,26 @@ __all__ = ["UnilateralContact"]
 
 @dataclass(frozen=True, eq=False)
 class UnilateralContact:
-    """One unilateral contact: a gap that may not close further than zero, or only against a stiffness.
+    """One unilateral contact: a gap that cannot become negative, or only against a stiffness.
 
         g(x) = h.x + gap,   open where g > 0;   force lambda >= 0 [N] along +h
 
-        rigid      lambda >= 0, g >= 0, lambda g = 0;  struck g'+ >= -e g'-  (Moreau)
+        rigid      lambda >= 0, g >= 0, lambda g = 0;  impact g'+ >= -e g'-  (Moreau)
         compliant  lambda = k max(0, -g)
         viscous    lambda = max(0, k (-g) + c (-g')) where g < 0, else 0
 
         stick      T = k_t (h_t.x - v_t t - w), or the reaction;  |T| <= mu_s N
         slip       T = s mu N,  N = lambda,  s (h_t.x' - v_t - T' / k_t) >= 0,  s = 1 or -1
 
-    The force on the structure is h N - h_t T. What sticks without a spring holds its place w, h_t.x - v_t t = w, and T
-    is the reaction. A stop 1.35 mm below a beam that bends upward has h = +e_tip and gap = 1.35e-3; a stop above it has
+    The force on the structure is h N - h_t T. During stick without a spring h_t.x - v_t t = w is constant, and T is the
+    reaction. A stop 1.35 mm below a beam that bends upward has h = +e_tip and gap = 1.35e-3; a stop above it has
     h = -e_tip; two bodies that face each other have one coefficient each. Two contacts are equal only if they are the
     same object.
 
     Parameters
     ----------
     name : str
-        How levels, events and results refer to it.
+        Name in levels, events and results.
     direction : str, mapping or array (n,)
         h, along which the gap opens: a point name, {point: coefficient} or a row.
     gap : float
@@ -100,27 +100,27 @@ class UnilateralContact:
     stiffness : float, default inf
         k [N/m], > 0; infinite for a rigid contact.
     damping : float, default 0.0
-        c [N s/m] beside a finite stiffness, >= 0.
+        c [N s/m], >= 0, with a finite stiffness.
     friction : float, default 0.0
-        mu while it slides, >= 0.
+        mu during slip, >= 0.
     tangential : str, mapping or array (n,), default None
-        h_t, along which it slides, given as h is; needed where there is friction.
+        h_t, direction of sliding, in the same forms as h; needed with friction.
     static_friction : float, default None
-        mu_s >= mu up to which it sticks; None: the same.
+        mu_s >= mu, limit of stick; None: mu.
     tangential_stiffness : float, default inf
-        k_t [N/m] of the spring in series with the friction, of an elastic contact only; infinite for none.
+        k_t [N/m] of the spring in series with the friction, for an elastic contact only; infinite for none.
     restitution : float, default 0.0
-        e of a rigid contact, 0 to 1. Those that are struck together, and are coupled, need one e.
+        e of a rigid contact, 0 to 1. Coupled contacts with a common impact need the same e.
     tangential_velocity : float, default 0.0
         v_t [m/s] of the counter-surface along +h_t.
 
     Raises
     ------
     MultiPhiTypeError
-        For a name that is no text, and for what are no numbers.
+        For a name that is not a string, and values that are not numbers.
     MultiPhiValueError
-        For numbers out of these ranges; damping of a rigid contact, restitution of one that is not, friction without a
-        tangential direction, a tangential spring of a rigid or a viscous contact.
+        For numbers out of these ranges; damping of a rigid contact, restitution of a compliant one, friction without a
+        tangential direction, and a tangential spring of a rigid or a viscous contact.
 
     Examples
     --------
@@ -171,7 +171,7 @@ class UnilateralContact:
         if not 0 <= self.restitution <= 1:
             raise self._refused("restitution", "need a value from 0 to 1")
         if self.restitution and not self.rigid:
-            needed = "need stiffness=inf (what a compliant contact loses is its damping)"
+            needed = "need stiffness=inf (the loss of a compliant contact is its damping)"
             raise self._refused("restitution", needed, " beside a finite stiffness")
         self._check_friction()
 
@@ -205,17 +205,17 @@ class UnilateralContact:
 
     @property
     def most(self) -> float:
-        """mu_s, up to which it sticks."""
+        """mu_s, limit of stick."""
         return self.friction if self.static_friction is None else self.static_friction
 
     @property
     def drop(self) -> float:
-        """Part of the tangential spring's energy that is lost where it begins to slip."""
+        """Part of the tangential spring's energy that is lost when slip begins."""
         return 1 - (self.friction / self.most) ** 2 if self.most else 0.0
 
     @functools.cached_property
     def further(self) -> tuple[Link, ...]:
-        """Where there is friction: the tangential link, and the normal one with the friction of sliding to and fro."""
+        """With friction: the tangential link, and two normal links with the friction of slip in either direction."""
         if self.tangential is None or not self.most:
             return ()
         along, normal = (self.direction, self.gap, self.stiffness, self.damping), (1.0, self.direction)
@@ -236,7 +236,7 @@ class UnilateralContact:
 
     @functools.cached_property
     def states(self) -> tuple[ElementState, ...]:
-        """Open and closed; where there is friction, open, stick, slip+, slip-, and idle where others stick for it."""
+        """States open and closed; with friction, open, stick, slip+, slip-, and for a compliant contact idle."""
         plain = contact_states(self.rigid, self.damping > 0)
         if not self.further:
             return plain
@@ -256,12 +256,12 @@ class UnilateralContact:
         )
 
     def _idle(self, opening: Exit) -> ElementState:
-        """It does not push, as what sticks elsewhere holds it: h_t.x' = v_t, and it sticks itself where that ends."""
+        """State without T, in which other sticking contacts keep h_t.x' = v_t; when this ends, the contact sticks."""
         moves = (Exit("stick", firmness=TAKEN_ONCE, further=(Share(1, rate=s),)) for s in (1.0, -1.0))
         return ElementState("idle", "stick", (*moves, opening), holds=(0,))
 
     def _slip(self, sign: str, s: float, link: int, opening: Exit) -> ElementState:
-        """s (h_t.x' - v_t - s mu N' / k_t) >= 0, N' = -k h.x' of an elastic contact; and what opens it."""
+        """State with s (h_t.x' - v_t - s mu N' / k_t) >= 0, N' = -k h.x' of an elastic contact, and its opening."""
         share = Share(link, opening.gap, opening.rate, opening.force)
         opens = Exit("open", firmness=opening.firmness, further=(share,))
         if math.isinf(self.tangential_stiffness):
@@ -272,10 +272,10 @@ class UnilateralContact:
         return ElementState(f"slip{sign}", "slip", (back, opens), holds=(link,), rubs=(link, s * self.friction))
 
     def first_state(self, gap: float, rate: float, *rates: float) -> str:
-        """The state in which a run starts that begins with a gap [m], zero where it is round-off, and its rate [m/s].
+        """State at the start of a run with a gap [m], zero if it is round-off, and its rate [m/s].
 
-        A rigid contact starts open, and closes at once where it is pressed on; a viscous one never pulls. rates: of its
-        further links; without a spring it sticks only at rest on its counter-surface.
+        A rigid contact starts open, and closes at once if it is pressed; a viscous one never pulls. rates: of the
+        further links; without a spring the contact sticks only without velocity relative to its counter-surface.
         """
         pulls = self.damping > 0 and self.stiffness * gap + self.damping * rate > 0
         if gap >= 0 or self.rigid or pulls:

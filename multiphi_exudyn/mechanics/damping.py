@@ -1,4 +1,4 @@
-"""Damping of a structure by its modes or by its matrices, beside a matrix C of its own.
+"""Damping of a structure by modal ratios or by its matrices, as alternatives to a matrix C.
 
 C = M Phi diag(2 zeta omega) Phi^T M   (ModalDamping),   C = alpha M + beta K   (RayleighDamping)
 """
@@ -23,8 +23,8 @@ class ModalDamping:
 
         C = M Phi diag(2 zeta omega) Phi^T M
 
-    Of modes of equal frequency the first is the one that the first point sees that moves in them; the others are those
-    that it does not see.
+    Modes of equal frequency are chosen so that the first point with any displacement in them moves in the first mode
+    only.
 
     Parameters
     ----------
@@ -32,15 +32,15 @@ class ModalDamping:
         zeta, fractions of critical damping (0.01 is 1 %), one per mode from the lowest, or a single number for all
         modes.
     beyond : float, default None
-        The ratio of every mode that is not listed; None: not said, they are undamped and a run that has such modes
-        warns of it.
+        Ratio of every mode that is not listed. None: these modes are undamped, and a run with such modes issues a
+        warning.
 
     Raises
     ------
     MultiPhiTypeError
-        For what are no real numbers.
+        For values that are not real numbers.
     MultiPhiValueError
-        For ratios that are negative or not finite, and ``beyond`` beside a single number.
+        For ratios that are negative or not finite, and ``beyond`` together with a single number.
 
     Examples
     --------
@@ -69,11 +69,11 @@ class ModalDamping:
 
     @property
     def listed(self) -> np.ndarray:
-        """The ratios that were given, one per mode from the lowest, (k,)."""
+        """Listed ratios (k,), one per mode from the lowest."""
         return np.asarray(self.ratios, dtype=float)
 
     def of(self, count: int) -> np.ndarray:
-        """Ratios of the lowest ``count`` modes, (count,)."""
+        """Ratios (count,) of the lowest ``count`` modes."""
         ratios = np.full(count, self.beyond or 0.0)
         listed = self.listed[:count]
         ratios[: len(listed)] = listed
@@ -94,7 +94,7 @@ class RayleighDamping:
     Raises
     ------
     MultiPhiTypeError
-        For what are no numbers.
+        For values that are not numbers.
     MultiPhiValueError
         For values that are negative or not finite.
 

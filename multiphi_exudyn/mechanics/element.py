@@ -1,33 +1,34 @@
-"""Element: what stands at a point of a structure, or between two, and is linear in each of its states.
+"""Element: a contact, friction or force law at a point of a structure, or between two points, linear in each state.
 
-It has links, of which some hold in each of its states. The element itself is the first of them, most have no other:
+An element has links, some of which act (hold) in each of its states. The element itself is the first link; most
+elements have no other:
 
     q = h.x + gap - v t - w
     lambda = -k q - c q', force on the structure along +f;   rigid: q = 0, lambda its reaction
 
-f is h, or another direction where a force beside the link's own goes with it, as friction goes with pressure. v is the
-speed of the surface at its other side. w is zero, or *held*: a place that nothing but a change of state moves. Where
-the link begins to hold, w becomes what gives it the stretch q that the state before says. In every state a constant
-force, the push, may act along +h of the first link as well.
+f is h, or another direction if a further force is proportional to that of the link, as friction is to pressure. v is
+the velocity of the counter-surface. w is zero, or *held*: a position that only a change of state moves. When the link
+begins to act, w takes the value that gives the link the stretch q which the previous state defines. In every state a
+constant force, the push, may act along +h of the first link as well.
 
-A state lasts as long as for each of its exits, summed over the links
+A state lasts as long as for each of its exits the signal, summed over the links, is not negative,
 
     gap q + rate q' + force lambda + constant >= 0
 
-Where that falls through zero the element asks for the state that the exit leads to. Where it is negative after others
-have changed (or a change in truncated modes), the exit says by its firmness what holds:
+When it falls through zero, the element requests the state to which the exit leads. If it is negative after changes of
+other elements (or a change in truncated modes), the firmness of the exit decides:
 
-    MAY_RECOVER      while it rises the state stays, and the exit waits until it has risen to zero
-    NEVER_RECOVERS   it does not wait for that
-    ALWAYS_TAKEN     nor for whether the state it leads to admits it: it changes at once
-    TAKEN_ONCE       it waits while it rises; else it changes at once, but stays where it has just come from there
-    TAKEN_FALLING    it waits while it rises; else it changes at once
+    MAY_RECOVER      the state stays while the signal rises, and the exit waits until it has risen to zero
+    NEVER_RECOVERS   the exit does not wait for the signal to rise
+    ALWAYS_TAKEN     nor does it ask whether the new state is admissible: the state changes at once
+    TAKEN_ONCE       it waits while the signal rises; else the state changes at once, but not back to the last state
+    TAKEN_FALLING    it waits while the signal rises; else the state changes at once
 
     contact          open: q;  closed: -q where compliant, lambda where rigid (always taken) or viscous (never recovers)
     friction |T| <= F, T = -lambda, rigid or by a spring in series
-                     stick (the link holds, w held): F + lambda and F - lambda;  slip s: push -s F, stretch s F / k,
+                     stick (the link acts, w held): F + lambda and F - lambda;  slip s: push -s F, stretch s F / k,
                      exit s q', back into stick, taken once; those of stick always taken
-    force law        a segment: its links hold, exits q' - q and q - q'' at its ends, taken once
+    force law        a segment: its links act, exits q' - q and q - q'' at its ends, taken once
 """
 
 from __future__ import annotations
@@ -65,10 +66,10 @@ MAY_RECOVER, NEVER_RECOVERS, ALWAYS_TAKEN, TAKEN_ONCE, TAKEN_FALLING = 0, 1, 2, 
 
 @dataclass(frozen=True)
 class Link:
-    """A link beside an element's first one; see the module's docstring.
+    """A further link of an element, see the module's docstring.
 
     name, direction, gap, stiffness, damping, velocity, held: as of an Element. push: f as a sum of coefficients times
-    rows, empty for h; only a link whose h, gap, stiffness and damping are those of the first link has one of its own.
+    rows, empty for f = h; only a link with h, gap, stiffness and damping of the first link may have another f.
     """
 
     name: str
@@ -87,7 +88,7 @@ class Link:
 
 
 class Share(NamedTuple):
-    """What a link has in an exit's signal: coefficients of its q, q' and lambda."""
+    """Share of a link in an exit's signal: coefficients of its q, q' and lambda."""
 
     link: int
     gap: float = 0.0
@@ -96,7 +97,7 @@ class Share(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """The states that an exit asks for in place of its own while a link's q' is positive, or negative."""
+    """States that an exit requests instead of its own if a link's q' is positive (forward) or negative (backward)."""
 
     link: int
     forward: str
@@ -105,9 +106,10 @@ class Turn(NamedTuple):
 
 @dataclass(frozen=True)
 class Exit:
-    """A way out of a state into ``asked``; coefficients of its signal [1 and s times its unit], constant, firmness.
+    """Exit of a state, which requests the state ``asked``; constant and firmness as in the module's docstring.
 
-    gap, rate, force: of the first link. further: the shares of others. turn: where the way hangs on a speed.
+    gap, rate, force: coefficients of the first link in the signal; further: shares of other links. turn: requested
+    states that depend on the sign of a velocity, or None.
     """
 
     asked: str
@@ -121,17 +123,17 @@ class Exit:
 
     @property
     def shares(self) -> tuple[Share, ...]:
-        """Of all links, the first one's first."""
+        """Shares of all links, beginning with the first link."""
         return (Share(0, self.gap, self.rate, self.force), *self.further)
 
 
 @dataclass(frozen=True)
 class ElementState:
-    """One state; see the module's docstring.
+    """One state of an element, see the module's docstring.
 
-    event: kind of the event that enters it, "close" where it is left open. holds: numbers of the links that hold.
-    push: constant force [N] along +h. stretch: of the held link [m], kept for a state in which it holds. rubs: a link,
-    and how much of its force friction T has against the held link; its stretch goes with T.
+    event: kind of the event that enters the state, "close" if it comes from open. holds: numbers of the links that act.
+    push: constant force [N] along +h. stretch: of the held link [m], for the state in which it acts next. rubs: number
+    of a link and the coefficient of its force in the friction force T against the held link, which gives the stretch.
     """
 
     name: str
@@ -144,7 +146,7 @@ class ElementState:
 
 
 class AnyLink(Protocol):
-    """direction, gap, stiffness, damping, rigid: as of a UnilateralContact. velocity: v [m/s]. held: whether w is."""
+    """A link: direction, gap, stiffness, damping, rigid as of a UnilateralContact; v [m/s]; whether w is held."""
 
     @property
     def name(self) -> str: ...
@@ -166,10 +168,10 @@ class AnyLink(Protocol):
 
 @runtime_checkable
 class Element(AnyLink, Protocol):
-    """An element by its links and its states; contacts, friction and force laws are elements.
+    """An element with its links and its states: a contact, friction or a force law.
 
-    It is its own first link; further: the others. drop: the part of the energy of its held link's spring that is lost
-    where the state in which it holds is left.
+    It is its own first link; further: its other links. drop: part of the energy of its held link's spring that is lost
+    at the end of the state in which this link acts.
     """
 
     @property
@@ -179,24 +181,21 @@ class Element(AnyLink, Protocol):
     @property
     def states(self) -> tuple[ElementState, ...]: ...
     def first_state(self, q: float, rate: float, *rates: float) -> str:
-        """The state in which it starts, w = 0, at rest relative to its surroundings where ``rate`` is zero.
-
-        rates: q' of its further links.
-        """
+        """State at the start of a run with q, q' = ``rate`` and w = 0; rates: q' of the further links."""
 
 
 def links_of(elements: Sequence[Element]) -> tuple[AnyLink, ...]:
-    """All links: the first ones in the order of the elements, then the further ones."""
+    """All links: the first links in the order of the elements, then the further ones."""
     return (*elements, *(link for element in elements for link in element.further))
 
 
 def link_places(elements: Sequence[Element]) -> tuple[tuple[int, ...], ...]:
-    """Where every element's links stand among all of them."""
-    places, end = [], len(elements)
+    """Indices of every element's links among all links."""
+    indices, end = [], len(elements)
     for i, element in enumerate(elements):
-        places.append((i, *range(end, end + len(element.further))))
+        indices.append((i, *range(end, end + len(element.further))))
         end += len(element.further)
-    return tuple(places)
+    return tuple(indices)
 
 
 def is_oblique(link: AnyLink) -> bool:
@@ -204,15 +203,15 @@ def is_oblique(link: AnyLink) -> bool:
     return isinstance(link, Link) and bool(link.push)
 
 
-def event_kind(states: Sequence[ElementState], left: int, entered: int) -> str:
-    """Kind of the event that leads from one state to another: a contact that was open closes, whatever it enters."""
-    return "close" if states[left].name == "open" != states[entered].name else states[entered].event
+def event_kind(states: Sequence[ElementState], source: int, target: int) -> str:
+    """Kind of the event from one state to another; "close" from open to any other state."""
+    return "close" if states[source].name == "open" != states[target].name else states[target].event
 
 
 def friction_spring(element: Element) -> tuple[int, int, float, float]:
-    """Of an element with a held link: the state in which that holds, its number, its spring [N/m], zero for none.
+    """State in which the held link of an element acts, the link's number, its spring [N/m] (zero for none), and drop.
 
-    And what the spring loses of its energy where it begins to slip. (-1, 0, 0, 0) of other elements.
+    (-1, 0, 0, 0) for an element without a held link.
     """
     links: tuple[AnyLink, ...] = (element, *element.further)
     held = next((number for number, link in enumerate(links) if link.held), None)
@@ -224,7 +223,7 @@ def friction_spring(element: Element) -> tuple[int, int, float, float]:
 
 
 def contact_states(rigid: bool, viscous: bool) -> tuple[ElementState, ...]:
-    """Open and closed."""
+    """States of a contact without friction: open and closed."""
     opening = Exit("open", gap=-1.0)
     if viscous:
         opening = Exit("open", force=1.0, firmness=NEVER_RECOVERS)

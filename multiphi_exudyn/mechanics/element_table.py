@@ -1,4 +1,4 @@
-"""Element table: the elements of a model with their links, one after the other, and what these are in each state."""
+"""Element table: the elements of a model with all their links, and the links that act in each state."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ __all__ = ["ElementTable"]
 
 
 class ElementTable:
-    """What the elements ``contacts`` (c,) say of their l links, of which the first ones of all come first."""
+    """Table of the elements ``contacts`` (c,) and their l links, the first links of all elements before the others."""
 
     contacts: Sequence[Element]
 
     def index(self, name: str) -> int:
-        """Position of a contact."""
+        """Index of a contact by name."""
         for i, contact in enumerate(self.contacts):
             if contact.name == name:
                 return i
@@ -30,22 +30,22 @@ class ElementTable:
 
     @functools.cached_property
     def links(self) -> tuple[AnyLink, ...]:
-        """The links of all elements, the first ones first: a direction with a gap, a stiffness and a damping each."""
+        """Links of all elements, first links first; each has a direction, a gap, a stiffness and a damping."""
         return links_of(self.contacts)
 
     @functools.cached_property
     def link_places(self) -> tuple[tuple[int, ...], ...]:
-        """Where every element's links stand among them (c,)."""
+        """Indices of every element's links among all links (c,)."""
         return link_places(self.contacts)
 
     @functools.cached_property
     def held(self) -> tuple[int, ...]:
-        """Positions of the links that have a held place, one channel each."""
+        """Indices of the links with a stick position, which is a channel each."""
         return tuple(k for k, link in enumerate(self.links) if link.held)
 
     @functools.cached_property
     def laws(self) -> dict[int, ForceLaw]:
-        """Every force law by its position."""
+        """Force laws by index."""
         return {i: element for i, element in enumerate(self.contacts) if isinstance(element, ForceLaw)}
 
     @property
@@ -55,14 +55,14 @@ class ElementTable:
 
     @functools.cached_property
     def rubbing(self) -> tuple[int, ...]:
-        """Positions of the elements that have friction: a link with a held place."""
-        return tuple(i for i, places in enumerate(self.link_places) if not set(places).isdisjoint(self.held))
+        """Indices of the elements with friction, that is with a link that has a stick position."""
+        return tuple(i for i, indices in enumerate(self.link_places) if not set(indices).isdisjoint(self.held))
 
     @functools.cached_property
     def oblique(self) -> dict[int, int]:
-        """Links whose force acts along another direction than theirs, each with the first link of its element."""
-        given = ((k, places[0]) for places in self.link_places for k in places[1:])
-        return {k: first for k, first in given if is_oblique(self.links[k])}
+        """Links whose force has another direction than the link, with the first link of their element."""
+        pairs = ((k, indices[0]) for indices in self.link_places for k in indices[1:])
+        return {k: first for k, first in pairs if is_oblique(self.links[k])}
 
     @functools.cached_property
     def gaps(self) -> np.ndarray:
@@ -71,12 +71,12 @@ class ElementTable:
 
     @functools.cached_property
     def stiffnesses(self) -> np.ndarray:
-        """Stiffnesses (l,) [N/m], inf where rigid."""
+        """Stiffnesses (l,) [N/m], inf for rigid links."""
         return np.array([link.stiffness for link in self.links])
 
     @functools.cached_property
     def springs(self) -> np.ndarray:
-        """The same (l,), zero where rigid: a rigid contact stores nothing."""
+        """Stiffnesses (l,) [N/m], zero for rigid links, which store no energy."""
         return np.where(np.isinf(self.stiffnesses), 0.0, self.stiffnesses)
 
     @functools.cached_property
@@ -86,57 +86,58 @@ class ElementTable:
 
     @functools.cached_property
     def restoring(self) -> np.ndarray:
-        """Forces (2, l) of links along their directions at a gap and at a gap velocity of one: -springs, -dampings."""
+        """Forces (2, l) of links along their directions for a unit gap and a unit gap velocity: -springs, -dampings."""
         return -np.stack([self.springs, self.dampings])
 
     def label(self, link: int) -> str:
-        """What a link is called: its name, of a force law the law's, with friction that of its contact."""
-        element = next(i for i, places in enumerate(self.link_places) if link in places)
-        own = element in self.laws or link in self.oblique
-        return self.links[element if own else link].name
+        """Name of a link; that of its element for links of force laws and of sliding contacts."""
+        element = next(i for i, indices in enumerate(self.link_places) if link in indices)
+        has_element_name = element in self.laws or link in self.oblique
+        return self.links[element if has_element_name else link].name
 
     def pressing_links(self, element: int) -> list[int]:
-        """Positions of the links that press where a contact is closed, with and without friction.
+        """Indices of the links that press in the closed states of a contact, with and without friction.
 
-        Their gap is that of its first one. Of a force law, those that hold where it is not in segment "0".
+        They have the gap of its first link. For a force law: the links that act in other segments than "0".
         """
-        own, *further = self.link_places[element]
+        first, *further = self.link_places[element]
         if element in self.laws:
             return further
-        return [own, *(k for k in further if k in self.oblique)]
+        return [first, *(k for k in further if k in self.oblique)]
 
     def links_named(self, closed: Iterable[str]) -> tuple[int, ...]:
-        """Positions of the links that hold where these contacts are closed, all others open, laws in segment "0"."""
-        own = {i for i, law in self.laws.items() if law.stiffness}
-        return tuple(sorted({self._closed(name) for name in closed} | own))
+        """Indices of the links that act with these contacts closed, all others open, and laws in segment "0"."""
+        of_laws = {i for i, law in self.laws.items() if law.stiffness}
+        return tuple(sorted({self._closed(name) for name in closed} | of_laws))
 
     def _closed(self, name: str) -> int:
-        """Position of a contact that is closed, or friction that sticks."""
+        """Index of a contact that is closed, or of friction that sticks."""
         i = self.index(name)
         if i in self.laws:
             raise MultiPhiValueError(f"closed: got the force law {name!r}, need {{{name!r}: segment}}")
         return i
 
-    def states_named(self, given: Mapping[str, str]) -> tuple[int, ...]:
-        """Numbers of the states of all elements."""
+    def states_named(self, state_names: Mapping[str, str]) -> tuple[int, ...]:
+        """Numbers of the states of all elements, zero for those without a name."""
         states = [0] * len(self.contacts)
-        for name, state in given.items():
+        for name, state in state_names.items():
             i = self.index(name)
-            known = [own.name for own in self.contacts[i].states]
-            if state not in known:
-                raise MultiPhiValueError(f"state of {name!r}: got {state!r}, need one of: {', '.join(known)}")
-            states[i] = known.index(state)
+            possible = [each.name for each in self.contacts[i].states]
+            if state not in possible:
+                raise MultiPhiValueError(f"state of {name!r}: got {state!r}, need one of: {', '.join(possible)}")
+            states[i] = possible.index(state)
         return tuple(states)
 
     def links_held(self, states: Sequence[int]) -> tuple[int, ...]:
-        """Positions of the links that hold where the elements are in these states: they name the modes."""
-        return tuple(sorted(link for held, state in zip(self._holding, states, strict=True) for link in held[state]))
+        """Indices of the links that act with the elements in these states; they determine the modes."""
+        active = zip(self._active_links, states, strict=True)
+        return tuple(sorted(link for by_state, state in active for link in by_state[state]))
 
     @functools.cached_property
-    def _holding(self) -> list[list[list[int]]]:
-        """Positions of the links that hold, of every element in each of its states."""
-        given = zip(self.contacts, self.link_places, strict=True)
-        return [[[places[k] for k in state.holds] for state in contact.states] for contact, places in given]
+    def _active_links(self) -> list[list[list[int]]]:
+        """Indices of the links that act, for every element and each of its states."""
+        pairs = zip(self.contacts, self.link_places, strict=True)
+        return [[[indices[k] for k in state.holds] for state in contact.states] for contact, indices in pairs]
 
     @functools.cached_property
     def pushes_of_states(self) -> list[list[float]]:
@@ -145,14 +146,14 @@ class ElementTable:
 
     @functools.cached_property
     def general(self) -> bool:
-        """Whether there are elements that do more than their links: some have held places, or push."""
+        """Whether some elements have stick positions or pushes besides their links."""
         return bool(self.held) or any(any(pushes) for pushes in self.pushes_of_states)
 
     @functools.cached_property
     def struck_alone(self) -> np.ndarray:
-        """Positions of the rigid contacts where nothing rubs: an impulse is along a contact's own direction then."""
-        rubs = any(element.further or element.held for element in self.contacts)
-        return np.array([i for i, element in enumerate(self.contacts) if element.rigid and not rubs], int)
+        """Indices of the rigid contacts in a model without friction, where an impulse has a contact's own direction."""
+        has_friction = any(element.further or element.held for element in self.contacts)
+        return np.array([i for i, element in enumerate(self.contacts) if element.rigid and not has_friction], int)
 
     @functools.cached_property
     def levels_possible(self) -> int:

@@ -2,18 +2,18 @@
 
     force on the structure -F(q) along p,   q = p.x
 
-F is followed by straight segments between knots on the law itself. q_m, its centre, is the zero of F nearest to q = 0,
-without any the place nearest to q = 0. From the segment at q_m, of slope k_m,
+F is approximated by straight segments between knots on the law itself. q_m, its centre, is the zero of F nearest to
+q = 0, or without a zero the point of the span nearest to q = 0. From the segment at q_m, of slope k_m,
 
     F(q) = F(q_m) + k_m (q - q_m) + sum_j dk_j max(0, q - q_j) - sum_j dk'_j max(0, q'_j - q),   q_j >= q_m >= q'_j
 
-dk_j [N/m] is the change of slope at a knot, negative where the law softens. So the element has a link for k_m and one
-for each dk_j (element.py), and its states are nested: in segment +i those of the first i knots above q_m hold, in -i
-those below. Each has two exits, where q reaches one end of the segment or the other, into the next. Knots where the
-slope does not change are left out. F(q_m) is a constant force of every level. Strain energy is the integral of the
-segmented law from q_m. Beyond the span its last segments go on.
+dk_j [N/m] is the change of slope at a knot, negative where the law softens. The element has a link for k_m and one for
+each dk_j (element.py), and its states are nested: in segment +i the links of the first i knots above q_m act, in -i
+those below. Each segment has two exits, at its ends, into the next segments. Knots without a change of slope are left
+out. F(q_m) is a constant force of every level. The strain energy is the integral of the segmented law from q_m. Beyond
+the span the last segments are continued.
 
-Where the knots stand is in law_lines.py.
+The knots are chosen in law_lines.py.
 """
 
 from __future__ import annotations
@@ -41,26 +41,26 @@ class ForceLaw:
 
         force on the structure -F(q) along p,   q = p.x
 
-    F is followed by straight segments between knots that lie on it. The segment that q is in is the law's state: "0" at
-    q_m, the zero of F nearest to q = 0, "+1", "+2", ... above it, "-1", "-2", ... below. Beyond the span its last
-    segments go on. ``contact_force`` of a law is -F, ``gap`` is q - q_m. Two laws are equal only if they are the same
+    F is approximated by straight segments between knots on it. The segment of q is the law's state: "0" at q_m, the
+    zero of F nearest to q = 0, "+1", "+2", ... above it, "-1", "-2", ... below. Beyond the span the last segments are
+    continued. ``contact_force`` of a law is -F, ``gap`` is q - q_m. Two laws are equal only if they are the same
     object.
 
     Parameters
     ----------
     at : str, mapping or array (n,)
-        p, along which it acts: a point name, {point: coefficient} or a row.
+        p, direction of the force: a point name, {point: coefficient} or a row.
     law : callable, or two arrays (k,)
-        F [N] as a function of q [m], of a number or of (k,) numbers; or a table, q [m] ascending and F [N], whose lines
-        are the segments.
+        F [N] as a function of q [m], a number or (k,) numbers; or a table, q [m] ascending and F [N], whose lines are
+        the segments.
     tolerance : float, default None
-        Of a function: largest error of the segments, of the largest absolute F on the span; 0 < tolerance < 1.
+        For a function: largest error of the segments, relative to the largest |F| on the span; 0 < tolerance < 1.
     name : str, default "law"
-        How levels and results refer to it.
+        Name in levels and results.
     span : (float, float), default None
-        Of a function: (q_lo, q_hi) [m] on which it is followed.
+        For a function: range (q_lo, q_hi) [m] of the segments.
     segments : int, default None
-        Of a function, instead of a tolerance: number of segments.
+        For a function, instead of a tolerance: number of segments.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class ForceLaw:
     centre : float
         q_m [m].
     error : float
-        Of the segments, relative as the tolerance is.
+        Error of the segments, relative as the tolerance.
 
     Raises
     ------
@@ -109,8 +109,8 @@ class ForceLaw:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise MultiPhiTypeError(f"force law name: got {self.name!r}, need a non-empty string")
-        given = LawLines(f"force law {self.name!r}", self.law, self.tolerance, self.span, self.segments)
-        knots, forces, centre, error = given.found()
+        lines = LawLines(f"force law {self.name!r}", self.law, self.tolerance, self.span, self.segments)
+        knots, forces, centre, error = lines.knots_and_forces()
         slopes = np.diff(forces) / np.diff(knots)
         if not np.any(slopes):
             raise MultiPhiValueError(
@@ -120,7 +120,7 @@ class ForceLaw:
             object.__setattr__(self, name, value)
 
     def force(self, q: float | np.ndarray) -> np.ndarray:
-        """The segmented law at q, (k,) [N]."""
+        """Force (k,) [N] of the segmented law at q."""
         lines = np.clip(np.searchsorted(self.knots, q, side="right") - 1, 0, len(self.knots) - 2)
         return np.asarray(self.forces[lines] + self.slopes[lines] * (q - self.knots[lines]))
 
@@ -162,29 +162,29 @@ class ForceLaw:
 
     @functools.cached_property
     def stiffness(self) -> float:
-        """k_m [N/m], of the softer segment where two meet at q_m."""
+        """k_m [N/m]; of the softer segment if two meet at q_m."""
         return float(self.slopes[self._central])
 
     @functools.cached_property
     def _central(self) -> int:
-        """The number of its segment."""
-        place, last = int(np.searchsorted(self.knots, self.centre)), len(self.slopes) - 1
-        beside = min(place, last), max(place - 1, 0)
-        return min(beside, key=lambda k: abs(self.slopes[k]))
+        """Index of the segment at q_m."""
+        right, last = int(np.searchsorted(self.knots, self.centre)), len(self.slopes) - 1
+        adjacent = min(right, last), max(right - 1, 0)
+        return min(adjacent, key=lambda k: abs(self.slopes[k]))
 
     @property
     def levels(self) -> int:
-        """Number of levels it makes: segments of different slope."""
+        """Number of states of the law: segments of different slope."""
         return len(self.states)
 
     @property
     def knots_beside(self) -> tuple[int, int]:
-        """Number of knots where the slope changes, above segment "0" and below it."""
+        """Numbers of knots with a change of slope, above segment "0" and below it."""
         return len(self._above), len(self._below)
 
     @property
     def further(self) -> tuple[Link, ...]:
-        """A link for every change of slope: those above q_m from it outward, then those below it."""
+        """A link for every change of slope: above q_m in ascending order, then below it in descending order."""
         return (*self._above, *self._below)
 
     @functools.cached_property
@@ -198,26 +198,26 @@ class ForceLaw:
         return self._chain("-", np.diff(self.slopes[m::-1]), self.knots[m:0:-1])
 
     def _chain(self, sign: str, changes: np.ndarray, places: np.ndarray) -> tuple[Link, ...]:
-        bent, side = np.abs(changes) > STRAIGHT * np.max(np.abs(self.slopes)), float(f"{sign}1")
+        changed, side = np.abs(changes) > STRAIGHT * np.max(np.abs(self.slopes)), float(f"{sign}1")
         return tuple(
-            Link(f"{self.name}{sign}{i}", _times(self.at, -side), side * float(q), float(k))
-            for i, (k, q) in enumerate(zip(changes[bent], places[bent], strict=True), start=1)
+            Link(f"{self.name}{sign}{i}", _scaled(self.at, -side), side * float(q), float(k))
+            for i, (k, q) in enumerate(zip(changes[changed], places[changed], strict=True), start=1)
         )
 
     @functools.cached_property
     def states(self) -> tuple[ElementState, ...]:
-        """The segments: that at q_m, those above it from there outward, then those below it."""
+        """Segments: that at q_m, those above it in ascending order, then those below it in descending order."""
         up, down = len(self._above), len(self._below)
         return tuple(self._segment(i) for i in (*range(up + 1), *range(-1, -down - 1, -1)))
 
     def _segment(self, i: int) -> ElementState:
-        """Segment i, with the links of those between it and q_m."""
+        """State of segment i, in which the links between it and q_m act."""
         chain = range(1, i + 1) if i > 0 else range(len(self._above) + 1, len(self._above) + 1 - i)
-        own = (0,) if self.stiffness else ()
-        return ElementState(_called(i), "segment", tuple(self._ways(i)), holds=(*own, *chain))
+        central = (0,) if self.stiffness else ()
+        return ElementState(_state_name(i), "segment", tuple(self._exits(i)), holds=(*central, *chain))
 
-    def _ways(self, i: int) -> Iterator[Exit]:
-        """Out of segment i: outward where the next link's gap closes, inward where that of the last one opens."""
+    def _exits(self, i: int) -> Iterator[Exit]:
+        """Exits of segment i: outward when the gap of the next link closes, inward when that of the last link opens."""
         up, down = len(self._above), len(self._below)
         for side, first, count in ((1, 1, up), (-1, up + 1, down)):
             if 0 <= side * i < count:
@@ -226,23 +226,23 @@ class ForceLaw:
                 yield _exit(i - side, first + abs(i) - 1, -1.0)
 
     def first_state(self, gap: float, rate: float, *rates: float) -> str:
-        """The segment in which a run starts that begins with q - q_m [m]."""
+        """Segment at the start of a run with q - q_m = gap [m]."""
         q = self.centre + gap
-        return _called(sum(q > link.gap for link in self._above) - sum(-q > link.gap for link in self._below))
+        return _state_name(sum(q > link.gap for link in self._above) - sum(-q > link.gap for link in self._below))
 
 
-def _called(segment: int) -> str:
-    """The name of the state."""
+def _state_name(segment: int) -> str:
+    """Name of a segment's state."""
     return f"{segment:+d}" if segment else "0"
 
 
 def _exit(into: int, link: int, side: float) -> Exit:
-    """The exit into a segment where a link's gap falls through zero, or rises through it for a side of -1."""
-    return Exit(_called(into), firmness=TAKEN_ONCE, further=(Share(link, gap=side),))
+    """Exit into a segment when a link's gap falls through zero, or rises through zero for side = -1."""
+    return Exit(_state_name(into), firmness=TAKEN_ONCE, further=(Share(link, gap=side),))
 
 
-def _times(at: At, factor: float) -> At:
-    """factor p."""
+def _scaled(at: At, factor: float) -> At:
+    """The direction factor p, in the form of ``at``."""
     if isinstance(at, str):
         return {at: factor}
     if isinstance(at, Mapping):

@@ -3,8 +3,8 @@
     T = k (h.x - w - v t)   while it sticks, |T| <= static limit; without a spring h.x - w - v t = 0, T its reaction
     T = +-limit             while it slips, against the slip of the patch: s = sign of h.x' - v = sign of T
 
-The force on the structure is -h T. w is the place of the contact patch on the counter-surface, which itself moves with
-the speed v along +h. Stick ends where |T| reaches the static limit; slip ends where its speed falls to zero.
+The force on the structure is -h T. w is the position of the contact patch on the counter-surface, which moves with the
+velocity v along +h. Stick ends when |T| reaches the static limit; slip ends when its velocity falls to zero.
 
 Source: W. D. Iwan, A distributed-element model for hysteresis and its steady-state dynamic response, Trans. ASME
 J. Appl. Mech. 33 (1966).
@@ -31,21 +31,21 @@ class Friction:
         stick   T = k (h.x - w - v t), or the reaction;  |T| <= static limit
         slip    T = s limit,  s the sign of h.x' - v
 
-    The force on the structure is -h T; w is the place of the contact patch on the counter-surface. Without a spring it
-    is held, h.x - w - v t = 0, and T is the reaction. Stick ends where |T| reaches the static limit, slip where its
-    speed falls to zero. Two of them are equal only if they are the same object. Source: W. D. Iwan, Trans. ASME J.
-    Appl. Mech. 33 (1966).
+    The force on the structure is -h T; w is the position of the contact patch on the counter-surface. Without a spring
+    the point sticks, h.x - w - v t = 0, and T is the reaction. Stick ends when |T| reaches the static limit, slip when
+    its velocity falls to zero. Two frictions are equal only if they are the same object. Source: W. D. Iwan, Trans.
+    ASME J. Appl. Mech. 33 (1966).
 
     Parameters
     ----------
     name : str
-        How levels, events and results refer to it.
+        Name in levels, events and results.
     direction : str, mapping or array (n,)
-        h, along which it acts: a point name, {point: coefficient} or a row.
+        h, direction of the friction: a point name, {point: coefficient} or a row.
     limit : float
-        |T| [N] while it slips, > 0.
+        |T| [N] during slip, > 0.
     static_limit : float, default None
-        |T| [N] at which it begins to, >= limit; None: the same.
+        |T| [N] at which slip begins, >= limit; None: limit.
     stiffness : float, default inf
         k [N/m] of the spring in series, > 0; infinite for none.
     velocity : float, default 0.0
@@ -54,7 +54,7 @@ class Friction:
     Raises
     ------
     MultiPhiTypeError
-        For a name that is no text, and for what are no numbers.
+        For a name that is not a string, and values that are not numbers.
     MultiPhiValueError
         For numbers out of these ranges.
 
@@ -104,12 +104,12 @@ class Friction:
 
     @property
     def most(self) -> float:
-        """|T| [N] at which it begins to slip."""
+        """|T| [N] at which slip begins."""
         return self.limit if self.static_limit is None else self.static_limit
 
     @property
     def drop(self) -> float:
-        """Part of the spring's energy that is lost where it begins to slip."""
+        """Part of the spring's energy that is lost when slip begins."""
         return 1 - (self.limit / self.most) ** 2
 
     @property
@@ -130,7 +130,7 @@ class Friction:
         return ElementState(f"slip{sign}", "slip", (back,), push=-s * self.limit, stretch=stretch)
 
     def first_state(self, q: float, rate: float, *rates: float) -> str:
-        """Stick, with a spring or at rest on its counter-surface; else slip, in the direction of its speed [m/s]."""
+        """Stick with a spring or without relative velocity [m/s]; else slip, in the direction of this velocity."""
         if not self.rigid or rate == 0:
             return "stick"
         return "slip+" if rate > 0 else "slip-"

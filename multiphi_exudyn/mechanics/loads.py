@@ -1,6 +1,6 @@
-"""Loads that vary: f(t) in M x'' + C x' + K x = f(t) (eq. 38.1), and what is known of loads of all kinds.
+"""Loads that vary: f(t) in M x'' + C x' + K x = f(t) (eq. 38.1), and functions for loads of all kinds.
 
-A load is a place and a course (time_functions.py),
+A load has a point, with the row p, and a function of time (time_functions.py),
 
     f(t) = p u(t)
 """
@@ -40,12 +40,12 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class VaryingLoad(ABC):
-    """f(t) = p u(t). at: where, as in ConstantLoad."""
+    """A load f(t) = p u(t); at: its point, as in ConstantLoad."""
 
     at: At
 
     def __post_init__(self) -> None:
-        _ = self.course  # checked by being made
+        _ = self.course  # its constructor checks the arguments
 
     @property
     @abstractmethod
@@ -62,7 +62,7 @@ class HarmonicLoad(VaryingLoad):
     Parameters
     ----------
     at : str, mapping or array (n,)
-        p, where it acts: a point name, {point: coefficient} or a row.
+        p, point of the force: a point name, {point: coefficient} or a row.
     amplitude : float
         [N], [N m] on a rotation.
     frequency_hz : float
@@ -73,7 +73,7 @@ class HarmonicLoad(VaryingLoad):
     Raises
     ------
     MultiPhiTypeError
-        For what are no numbers.
+        For values that are not numbers.
     MultiPhiValueError
         For values that are not finite, and a frequency < 0.
 
@@ -103,14 +103,14 @@ class HarmonicLoad(VaryingLoad):
 
 @dataclass(frozen=True, eq=False)
 class SampledLoad(VaryingLoad):
-    """A force at a point in straight lines between samples, zero outside them: f(t) = p u(t).
+    """A force at a point with straight lines between samples, zero outside them: f(t) = p u(t).
 
     ``Sampled.from_csv`` reads samples from a file.
 
     Parameters
     ----------
     at : str, mapping or array (n,)
-        p, where it acts: a point name, {point: coefficient} or a row.
+        p, point of the force: a point name, {point: coefficient} or a row.
     time : array (k,)
         Ascending times [s], two or more.
     force : array (k,)
@@ -119,10 +119,10 @@ class SampledLoad(VaryingLoad):
     Raises
     ------
     MultiPhiTypeError
-        For what are no real numbers.
+        For values that are not real numbers.
     MultiPhiValueError
-        For fewer than two samples, as many times as forces not given, times that do not ascend, values that are not
-        finite.
+        For fewer than two samples, unequal numbers of times and forces, times that do not ascend, and values that are
+        not finite.
 
     Examples
     --------
@@ -156,24 +156,24 @@ class SampledLoad(VaryingLoad):
 class FunctionLoad(VaryingLoad):
     """A force at a point that is a function of time, f(t) = p function(t).
 
-    It is known by samples: what is shorter than 4.2e-5 of a run's length may not be seen, 1.1e-4 of it for a function
-    of single times, unless ``breaks`` enclose it.
+    It is sampled: a feature shorter than 4.2e-5 of a run's length may be missed (1.1e-4 for a function of single
+    times), unless ``breaks`` enclose it.
 
     Parameters
     ----------
     at : str, mapping or array (n,)
-        p, where it acts: a point name, {point: coefficient} or a row.
+        p, point of the force: a point name, {point: coefficient} or a row.
     function : callable
-        Force [N] of time [s], of (k,) times or of single ones.
+        Force [N] as a function of time [s], of (k,) times or of single ones.
     tolerance : float, default 1e-9
-        Of the response, relative to its largest value; 1e-12 <= tolerance < 1.
+        Tolerance of the response, relative to its largest value; 1e-12 <= tolerance < 1.
     breaks : sequence of float, default ()
-        Instants [s] at which the function or a derivative jumps; those that are seen are found without.
+        Times [s] at which the function or a derivative jumps; jumps that show in the samples are found without.
 
     Raises
     ------
     MultiPhiTypeError
-        For what is no function, no number, or no sequence of times.
+        For arguments that are not a function, a number, or a sequence of times.
     MultiPhiValueError
         For a tolerance out of range; in a run, for a function that does not give finite numbers.
 
@@ -210,22 +210,22 @@ class SweepLoad(VaryingLoad):
     Parameters
     ----------
     at : str, mapping or array (n,)
-        p, where it acts: a point name, {point: coefficient} or a row.
+        p, point of the force: a point name, {point: coefficient} or a row.
     amplitude : float
         [N], [N m] on a rotation.
     start_hz, end_hz : float
-        Frequencies [Hz] at its begin and its end, > 0.
+        Frequencies [Hz] at the start and the end, > 0.
     duration : float
         T [s], > 0.
     law : str, default "linear"
         "linear" or "logarithmic".
     tolerance : float, default 1e-9
-        Of the response, relative to its largest value; 1e-12 <= tolerance < 1.
+        Tolerance of the response, relative to its largest value; 1e-12 <= tolerance < 1.
 
     Raises
     ------
     MultiPhiTypeError
-        For what are no numbers.
+        For values that are not numbers.
     MultiPhiValueError
         For numbers out of these ranges, and another law.
 
@@ -256,20 +256,20 @@ class SweepLoad(VaryingLoad):
 
 
 def patterns(structure: LinearStructure, loads: Any) -> np.ndarray:
-    """Rows (k, n) of loads that act elsewhere than at points of the structure: given as a row, or on all its mass."""
-    found = [np.zeros((0, structure.n))]
+    """Rows (k, n) of loads that do not act at a named point: those given as a row, or on the whole mass."""
+    rows = [np.zeros((0, structure.n))]
     for load in loads if isinstance(loads, (tuple, list)) else ():
         if isinstance(load, (Gravity, BaseMotion)):
-            found.append((structure.mass @ structure.row(load.direction))[None, :])
+            rows.append((structure.mass @ structure.row(load.direction))[None, :])
         elif isinstance(load, (ConstantLoad, VaryingLoad)) and not isinstance(load.at, (str, Mapping)):
-            found.append(structure.row(load.at)[None, :])
-    return np.vstack(found)
+            rows.append(structure.row(load.at)[None, :])
+    return np.vstack(rows)
 
 
 def unchanging(loads: Any) -> tuple[Any, ...] | None:
-    """Loads as they are known by where nobody can change what they are; None where somebody can.
+    """Loads as a key of a cache if their values cannot change; else None.
 
-    A function may give another value tomorrow, a row or a mapping other numbers.
+    A function may return other values later, and a row or a mapping may be modified.
     """
     return tuple(loads) if isinstance(loads, (tuple, list)) and all(map(_unchanging, loads)) else None
 
@@ -277,8 +277,8 @@ def unchanging(loads: Any) -> tuple[Any, ...] | None:
 def _unchanging(load: Any) -> bool:
     if isinstance(load, StopMotion):
         return isinstance(load.course, (Harmonic, Sampled, Sweep))
-    place = load.direction if isinstance(load, Gravity) else getattr(load, "at", None)
-    return isinstance(load, (ConstantLoad, Gravity, HarmonicLoad, SampledLoad, SweepLoad)) and isinstance(place, str)
+    point = load.direction if isinstance(load, Gravity) else getattr(load, "at", None)
+    return isinstance(load, (ConstantLoad, Gravity, HarmonicLoad, SampledLoad, SweepLoad)) and isinstance(point, str)
 
 
 Load: TypeAlias = "StaticLoad | VaryingLoad | StopMotion | BaseMotion"

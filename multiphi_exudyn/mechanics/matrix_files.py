@@ -1,4 +1,4 @@
-"""Matrices from files: what a finite element program writes becomes a linear structure.
+"""Matrix files: linear structures from matrices that finite element programs have written.
 
 .mtx, .mtx.gz            Matrix Market, sparse or dense; of a symmetric matrix one triangle is enough
                          (R. F. Boisvert, R. Pozo, K. Remington, The Matrix Market exchange formats, NISTIR 5935, 1996)
@@ -25,7 +25,7 @@ import scipy.io
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import Matrix
-from multiphi_exudyn.mechanics.array_files import ARRAY_READERS, chosen, npz_arrays
+from multiphi_exudyn.mechanics.array_files import ARRAY_READERS, npz_arrays, select_array
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.dofs import DofTable, Place
 from multiphi_exudyn.mechanics.structure import LinearStructure
@@ -37,13 +37,13 @@ MatrixFile: TypeAlias = "str | os.PathLike[str] | tuple[str | os.PathLike[str], 
 
 T = TypeVar("T")
 
-NUMBERS = {  # of a Matrix Market file, by its field
+NUMBERS = {  # pattern of an entry in a Matrix Market file, by its field
     "integer": rb"[+-]?\d+",
     "real": rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?",
 }
 SHOWN = 40  # bytes of a wrong line that an error shows
 BANNER = b"%%MatrixMarket"
-FIRST_BYTES = {  # of files, and the endings that they go by
+FIRST_BYTES = {  # of files, with their type and usual extension
     BANNER: "Matrix Market, .mtx",
     b"\x93NUMPY": "a NumPy array, .npy",
     b"PK\x03\x04": "NumPy arrays, .npz",
@@ -51,7 +51,7 @@ FIRST_BYTES = {  # of files, and the endings that they go by
     b"\x89HDF": "HDF5, of MATLAB 7.3, .mat",
     b"\x1f\x8b": "a packed file, .mtx.gz",
 }
-ELSEWHERE = {  # what else programs write, and what to write in its place
+OTHER_FILES = {  # other files of programs, and what to write instead
     ".full": "an Ansys .full file: write its matrices by HBMAT",
     ".op2": "Nastran results: write the matrices by OUTPUT4, .op4",
     ".pch": "a Nastran punch file: write the matrices by OUTPUT4, .op4",
@@ -70,7 +70,7 @@ def read_structure(
     dofs: str | os.PathLike[str] | DofTable | Sequence[tuple[int, int | str]] | None = None,
     fixed: Iterable[Place] = (),
 ) -> LinearStructure:
-    """A linear structure of matrices in files, as finite element programs write them.
+    """A linear structure from matrices in files of finite element programs.
 
         .mtx, .mtx.gz          Matrix Market, and Abaqus *MATRIX OUTPUT
         .sti, .mas             CalculiX, SOLVER=MATRIXSTORAGE
@@ -87,26 +87,26 @@ def read_structure(
     stiffness : path, or (path, str)
         K (n, n) [N/m, N m].
     damping : path, (path, str), array (n, n), ModalDamping, RayleighDamping or None, default None
-        C (n, n) [N s/m, N m s] in a file, or what LinearStructure takes.
+        C (n, n) [N s/m, N m s] in a file, or damping as of LinearStructure.
     points : mapping of str to int, (int, str) or array (n,), default None
-        As LinearStructure takes them; degrees of freedom count from 0.
+        As of LinearStructure; degrees of freedom count from 0.
     dofs : path, or sequence of (int, str or int), default None
         (node, component) of every row, or a text file with both in each line ("17 3", "17,uz", CalculiX's "17.3").
-        Abaqus files with nodes (FORMAT=MATRIX INPUT) know it themselves; rows are then by node and component.
+        Abaqus files with nodes (FORMAT=MATRIX INPUT) contain it; rows are then sorted by node and component.
     fixed : iterable of int or (int, str), default ()
-        What the supports hold, in the numbering of the files, as LinearStructure takes it.
+        Degrees of freedom that supports fix, in the numbering of the files, as of LinearStructure.
 
     Returns
     -------
     LinearStructure
-        Of these matrices.
+        The structure with these matrices.
 
     Raises
     ------
     MultiPhiTypeError
-        For what is no path.
+        For an argument that is not a path.
     MultiPhiValueError
-        Naming the file that cannot be read and why; and what LinearStructure raises.
+        For a file that cannot be read, with its name and the reason, and for arguments that LinearStructure refuses.
 
     Examples
     --------
@@ -127,21 +127,20 @@ def read_structure(
         raise MultiPhiValueError("dofs: got a table beside files that name their nodes, need none")
     if isinstance(dofs, (str, os.PathLike)):
         dofs = _read("dofs", Path(dofs), "a readable table of nodes and components", _dof_rows)
-    places = {} if points is None else points
     return LinearStructure(
         matrices["mass"],
         matrices["stiffness"],
         matrices.get("damping", damping),
-        places,
+        {} if points is None else points,
         dofs=dofs if table is None else table,
         fixed=fixed,
     )
 
 
 def read_array(name: str, file: MatrixFile) -> Matrix:
-    """One array in a file, sparse or dense of any shape; ``name`` is what an error calls it."""
-    found = _matrix(name, file)
-    return found.matrix if isinstance(found, NodalMatrix) else found
+    """One array in a file, sparse or dense, of any shape; name: of the argument, for errors."""
+    matrix = _matrix(name, file)
+    return matrix.matrix if isinstance(matrix, NodalMatrix) else matrix
 
 
 def read_arrays(name: str, path: Path) -> dict[str, np.ndarray]:
@@ -150,32 +149,32 @@ def read_arrays(name: str, path: Path) -> dict[str, np.ndarray]:
 
 
 def _matrix(name: str, given: Any) -> Matrix | NodalMatrix:
-    wanted: str | None = None
+    array_name: str | None = None
     if isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], str):
-        given, wanted = given
+        given, array_name = given
     if not isinstance(given, (str, os.PathLike)):
         raise MultiPhiTypeError(f"{name}: got {type(given).__name__}, need the path of a file, or (path, array's name)")
     path = Path(given)
     several = ARRAY_READERS.get(path.suffix.lower())
     if several is not None:
-        return _read(name, path, "a readable matrix", lambda p: chosen(name, several(p), wanted))
+        return _read(name, path, "a readable matrix", lambda p: select_array(name, several(p), array_name))
     reader = next((read for ending, read in READERS.items() if path.name.lower().endswith(ending)), None)
     if reader is None:
-        instead = ELSEWHERE.get(path.suffix.lower())
+        instead = OTHER_FILES.get(path.suffix.lower())
         beside = f" ({instead})" if instead else ""
         raise MultiPhiValueError(f"{name}: got {str(path)!r}{beside}, need a file that ends in {', '.join(ENDINGS)}")
-    if wanted is not None:
-        raise MultiPhiValueError(f"{name}: got an array {wanted!r} of {str(path)!r}, need a file of several arrays")
+    if array_name is not None:
+        raise MultiPhiValueError(f"{name}: got an array {array_name!r} of {str(path)!r}, need a file of several arrays")
     return _read(name, path, "a readable matrix", reader)
 
 
-def _in_same_rows(found: Mapping[str, Matrix | NodalMatrix]) -> tuple[dict[str, Matrix], DofTable | None]:
-    """The matrices in the same rows, and what these are where files name their nodes."""
-    nodal = {name: matrix for name, matrix in found.items() if isinstance(matrix, NodalMatrix)}
+def _in_same_rows(matrices: Mapping[str, Matrix | NodalMatrix]) -> tuple[dict[str, Matrix], DofTable | None]:
+    """The matrices in common rows, and the table of these rows if the files have nodes."""
+    nodal = {name: matrix for name, matrix in matrices.items() if isinstance(matrix, NodalMatrix)}
     if not nodal:
-        return dict(found), None
-    if len(nodal) < len(found):
-        without = ", ".join(name for name in found if name not in nodal)
+        return dict(matrices), None
+    if len(nodal) < len(matrices):
+        without = ", ".join(name for name in matrices if name not in nodal)
         raise MultiPhiValueError(f"{without}: got a file without nodes beside others with nodes, need all of one kind")
     table = same_rows(nodal.values())
     return {name: matrix.in_rows(table) for name, matrix in nodal.items()}, table
@@ -184,20 +183,20 @@ def _in_same_rows(found: Mapping[str, Matrix | NodalMatrix]) -> tuple[dict[str, 
 def _read(name: str, path: Path, needed: str, read: Callable[[Path], T]) -> T:
     try:
         return read(path)
-    except Exception as error:  # readers raise whatever a file that is cut short or changed leads them to
+    except Exception as error:  # readers raise various errors for a truncated or modified file
         cause = " ".join(str(error).split()) or type(error).__name__
         raise MultiPhiValueError(f"{name}: got {str(path)!r}{_looks_like(path)}, need {needed}: {cause}") from error
 
 
 def _looks_like(path: Path) -> str:
-    """What the first bytes of a file say that it is, where its name says something else."""
+    """Type of a file by its first bytes, as text for an error, if the name has another extension; else empty."""
     try:
         with path.open("rb") as file:
             head = file.read(SHOWN)
     except OSError:
         return ""
-    said = next((kind for first, kind in FIRST_BYTES.items() if head.startswith(first)), None)
-    return "" if said is None or path.name.lower().endswith(said.rpartition(" ")[2]) else f" (it looks like {said})"
+    kind = next((kind for first, kind in FIRST_BYTES.items() if head.startswith(first)), None)
+    return "" if kind is None or path.name.lower().endswith(kind.rpartition(" ")[2]) else f" (it looks like {kind})"
 
 
 def _dof_rows(path: Path) -> list[tuple[int, int | str]]:
@@ -211,7 +210,7 @@ def _dof_rows(path: Path) -> list[tuple[int, int | str]]:
 
 
 def _mtx(path: Path) -> Matrix | NodalMatrix:
-    """Abaqus gives its matrices the ending of Matrix Market; their content tells."""
+    """A matrix of Abaqus or Matrix Market, which have the same extension and differ in their first line."""
     with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
         banner = file.read(len(BANNER))
     return _matrix_market(path) if banner == BANNER else triplets(path)
@@ -221,17 +220,17 @@ def _matrix_market(path: Path) -> Any:
     *_, layout, kind, _symmetry = scipy.io.mminfo(path)
     if kind not in NUMBERS:
         raise ValueError(f"it holds {'places without values' if kind == 'pattern' else f'{kind} numbers'}")
-    place = rb"\d+\s+\d+\s+" if layout == "coordinate" else b""
-    _check_entries(path, re.compile(rb"\s*" + place + NUMBERS[kind] + rb"(\s*\n)?"))
+    indices = rb"\d+\s+\d+\s+" if layout == "coordinate" else b""
+    _check_entries(path, re.compile(rb"\s*" + indices + NUMBERS[kind] + rb"(\s*\n)?"))
     return scipy.io.mmread(path)
 
 
 def _check_entries(path: Path, entry: re.Pattern[bytes]) -> None:
-    """Raises ValueError for a line that is no entry, such as a last one cut short: scipy's reader may crash on it."""
+    """Raise ValueError for a line that is not an entry, such as a truncated one: scipy's reader may crash on it."""
     with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as lines:
-        given = (line for line in lines if line.strip() and not line.startswith(b"%"))
-        next(given, None)  # the size
-        wrong = next((line for line in given if not entry.fullmatch(line)), None)
+        data_lines = (line for line in lines if line.strip() and not line.startswith(b"%"))
+        next(data_lines, None)  # the size
+        wrong = next((line for line in data_lines if not entry.fullmatch(line)), None)
     if wrong is not None:
         raise ValueError(f"an entry reads {wrong[:SHOWN]!r}")
 

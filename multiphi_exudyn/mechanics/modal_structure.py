@@ -1,17 +1,17 @@
-"""A structure known by its modes alone: a modal test, or a finite element result without its matrices.
+"""Modal structure: a structure given by its modes alone, from a modal test or a finite element result.
 
     x_p = sum_j phi_pj q_j + z_p,   m_j (q_j'' + 2 zeta_j omega_j q_j' + omega_j^2 q_j) = sum_p phi_pj F_p
     z_p = rho_p F_p,   rho_p = flexibility_p - sum_j phi_pj^2 / (m_j omega_j^2)
 
 q are the modal coordinates, x_p the displacement of a point. Modes that are not given would add to the flexibility of a
-point, and nothing in those that are tells by how much. Without it a contact acts on too stiff a structure, and a rigid
-stop stops the given modes alone: its forces are too large and too short. Three modes of a cantilever with a stop of
-1e6 N/m at half its length (examples/structures_from_files.py) make its largest force 47 % too large; completed, as
-follows, it is 2 % off. On a stop ten times as stiff both are off by more.
+point, by an amount that the given modes do not determine. Without it a contact acts on too stiff a structure, and a
+rigid stop stops the given modes alone: its forces are too large and too short. With three modes of a cantilever and a
+stop of 1e6 N/m at half its length (examples/structures_from_files.py), the largest force is 47 % too large; with the
+following completion its error is 2 %. With a stop ten times as stiff both errors are larger.
 
-Where the static flexibility of a point is known (its displacement under 1 N, from one static load case; of a free
-structure less its motion as a rigid body), rho_p completes it, by a coordinate z_p of its own with a frequency above
-the given ones. Of two points the residual flexibility between them is taken for zero.
+If the static flexibility of a point is known (its displacement under 1 N, from one static load case; of a free
+structure without its motion as a rigid body), rho_p completes it, by a further coordinate z_p with a frequency above
+the given ones. The residual flexibility between two points is assumed to be zero.
 
 Source: R. H. MacNeal, A hybrid method of component mode synthesis, Comput. Struct. 1 (1971) 581; D. J. Ewins, Modal
 Testing, 2000, ch. 5.
@@ -31,21 +31,21 @@ from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["ModalStructure", "structure_from_modes"]
 
-ABOVE = 2.0  # of the highest given frequency: residual coordinates there have the best peak forces of 1.5 to 10 times
-MEASURED = 1e-3  # of a point's flexibility: by so much it may be given smaller than that of the modes
-NOTHING = 1e-9  # of a point's flexibility: what the modes then miss of it is round-off
+ABOVE = 2.0  # of the highest given frequency: gives the best peak forces of factors from 1.5 to 10
+MEASURED = 1e-3  # of a point's flexibility: allowed deficit compared with that of the modes
+NOTHING = 1e-9  # of a point's flexibility: a smaller residual one is round-off
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ModalStructure(LinearStructure):
-    """A structure of given modes, whose coordinates are modal; made by ``structure_from_modes``.
+    """A structure in modal coordinates; the result of ``structure_from_modes``.
 
     Attributes
     ----------
     mass, stiffness : array (n, n)
         Modal masses and stiffnesses, diagonal.
     damping : array (n, n) or None
-        The same of damping.
+        Modal damping, diagonal.
     points : mapping of str to array (n,)
         Displacements of the points in the modes, as rows.
     dofs : None
@@ -55,7 +55,7 @@ class ModalStructure(LinearStructure):
     highest : float
         Frequency [Hz] of the last mode.
     completed : frozenset of str
-        The points whose static flexibility is known.
+        Points with a given static flexibility.
 
     Examples
     --------
@@ -76,14 +76,14 @@ def structure_from_modes(
     ratios: Sequence[float] | float = 0.0,
     flexibility: Mapping[str, float] | None = None,
 ) -> ModalStructure:
-    """A structure known by r modes alone: a modal test, or a finite element result without its matrices.
+    """A structure given by r modes alone, from a modal test or a finite element result.
 
         x_p = sum_j phi_pj q_j + z_p
         m_j (q_j'' + 2 zeta_j omega_j q_j' + omega_j^2 q_j) = sum_p phi_pj F_p
         z_p = rho_p F_p,   rho_p = flexibility_p - sum_j phi_pj^2 / (m_j omega_j^2)
 
     Modes that are not given would add to the flexibility of a point. Without it a contact acts on too stiff a
-    structure: its forces are too large and too short. Where it is known, z_p completes it by a coordinate of its own.
+    structure: its forces are too large and too short. If it is known, a further coordinate z_p completes it.
     Source: R. H. MacNeal, Comput. Struct. 1 (1971) 581.
 
     Parameters
@@ -97,8 +97,8 @@ def structure_from_modes(
     ratios : array (r,) or float, default 0.0
         Fractions of critical damping below 1 (0.01 is 1 %), or one for all modes.
     flexibility : mapping of str to float, default None
-        Point to its static displacement under a unit force there [m/N], of a free structure less its motion as a rigid
-        body. Where it is not given, a run with a contact there warns.
+        Point to its static displacement under a unit force there [m/N], of a free structure without its motion as a
+        rigid body. Without it, a run with a contact at the point issues a warning.
 
     Returns
     -------
@@ -150,7 +150,7 @@ def _flexibility(row: np.ndarray, masses: np.ndarray, omega: np.ndarray) -> floa
 
 
 def _missing(own: Mapping[str, float], given: Any) -> dict[str, float]:
-    """What the modes leave out of every given flexibility [m/N]."""
+    """Residual flexibility [m/N] of the points with a given one, beyond that of the modes."""
     if not isinstance(given, Mapping):
         raise MultiPhiTypeError(f"flexibility: got {type(given).__name__}, need {{point: m/N}}")
     missing = {}
@@ -175,7 +175,7 @@ def _ratios(given: Any, count: int) -> np.ndarray:
 
 
 def _numbers(name: str, given: Any, count: int | None, least: float = -np.inf) -> np.ndarray:
-    """Finite numbers (count,), or any number of them but none."""
+    """Finite numbers (count,), or one or more of them for None."""
     length = "r" if count is None else count
     array = np.asarray(real_array(name, given, f"({length},) real numbers"))
     if array.ndim != 1 or not array.size or (count is not None and len(array) != count):

@@ -1,7 +1,7 @@
 """Moving supports: stops and bases that move, the boundary values x_k(t) of (38.4).
 
-A moving stop adds its way to a gap, g = h.x + gap - z(t), and a moving base moves the whole structure, x being what
-remains relative to it:
+A moving stop changes a gap, g = h.x + gap - z(t). A moving base moves the whole structure, and x is the displacement
+relative to it:
 
     M x'' + C x' + K x = f - M e z''(t)
 """
@@ -24,7 +24,7 @@ __all__ = ["BaseMotion", "StopMotion"]
 class StopMotion:
     """A contact whose stop moves, g = h.x + gap - z(t).
 
-    The stop of a rigid contact may not jump in velocity: its course is Harmonic, Smooth or Sweep.
+    The velocity of a rigid contact's stop may not jump: its course is Harmonic, Smooth or Sweep.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class StopMotion:
     Raises
     ------
     MultiPhiTypeError
-        For a name that is no text, and a course of another kind.
+        For a name that is not a string, and a course of another kind.
     MultiPhiValueError
         For an empty name.
 
@@ -70,17 +70,17 @@ class BaseMotion:
     Parameters
     ----------
     direction : str, mapping or array (n,)
-        e, what a unit of rigid-body motion along the base's moves every degree of freedom by: a row, {point:
+        e, displacement of every degree of freedom in a unit rigid-body motion along that of the base: a row, {point:
         coefficient} or a point name.
     course : Harmonic, Smooth or Sweep
         z(t) [m], twice differentiable.
     fixed_stops : sequence of str, default ()
-        Names of the contacts whose stops stay where they are; all others move with the base.
+        Names of the contacts whose stops do not move; all others move with the base.
 
     Raises
     ------
     MultiPhiTypeError
-        For a course of another kind, and names that are no sequence of texts.
+        For a course of another kind, and names that are not a sequence of strings.
     MultiPhiValueError
         For an empty name.
 

@@ -1,7 +1,7 @@
 """Straight planar Timoshenko beam bending in x-z, as a linear structure.
 
-Two-node elements (section.py). Each node carries the deflection w [m], positive along +z, and the rotation theta [rad],
-positive where w grows with x (theta = dw/dx without shear).
+Two-node elements (section.py). Each node has the deflection w [m], positive along +z, and the rotation theta [rad],
+positive if w increases with x (theta = dw/dx without shear).
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ __all__ = ["beam_deflections", "beam_nodes", "planar_beam"]
 def beam_nodes(beam: Beam, elements: int) -> np.ndarray:
     """Node positions [m], ascending: a node at every named point, mass and section end.
 
-    ``elements`` is the number of elements aimed at; the pieces between the fixed places are divided
-    into equal elements no longer than length / elements, so there can be a few more.
+    elements: desired number of elements; the intervals between these positions are divided into equal elements not
+    longer than length / elements, so there may be a few more.
     """
     if not isinstance(beam, Beam):
         raise MultiPhiTypeError(f"beam: got {type(beam).__name__}, need a Beam")
@@ -33,7 +33,7 @@ def beam_nodes(beam: Beam, elements: int) -> np.ndarray:
         raise MultiPhiTypeError(f"elements: got {elements!r}, need an integer >= 1")
     if elements < 1:
         raise MultiPhiValueError(f"elements: got {elements}, need an integer >= 1")
-    places = np.sort(
+    positions = np.sort(
         np.array(
             [beam.start]
             + [s.end for s in beam.sections]
@@ -41,11 +41,11 @@ def beam_nodes(beam: Beam, elements: int) -> np.ndarray:
             + [mass.at for mass in beam.masses]
         )
     )
-    places = places[np.concatenate(([True], np.diff(places) > COINCIDENT * beam.length))]
+    positions = positions[np.concatenate(([True], np.diff(positions) > COINCIDENT * beam.length))]
     longest = beam.length / elements
     pieces = [
         np.linspace(left, right, math.ceil((right - left) / longest - 1e-9) + 1)[:-1]
-        for left, right in pairwise(places)
+        for left, right in pairwise(positions)
     ]
     return np.concatenate([*pieces, [beam.end]])
 
@@ -57,15 +57,15 @@ def planar_beam(
 
     Two-node elements with the exact static stiffness of the Timoshenko beam and the consistent mass of its cubic shape
     functions, rotary inertia included (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, 11.5). Degrees
-    of freedom: deflection w [m], positive along +z, and rotation theta [rad], positive where w grows with x, of every
-    node from the clamped end; those held by a rigid clamp are left out.
+    of freedom: deflection w [m], positive along +z, and rotation theta [rad], positive if w increases with x, of every
+    node from the clamped end, without those that a rigid clamp fixes.
 
     Parameters
     ----------
     beam : Beam
         Sections, points, masses and clamp.
     elements : int, default 57
-        Number aimed at; there is a node at every point, mass and section end, so there can be a few more.
+        Desired number; there is a node at every point, mass and section end, so there may be a few more.
     damping : array (n, n), ModalDamping, RayleighDamping or None, default None
         As of a LinearStructure.
 
@@ -77,9 +77,9 @@ def planar_beam(
     Raises
     ------
     MultiPhiTypeError
-        For what is no Beam, and a number of elements that is no integer.
+        For an argument that is not a Beam, and a number of elements that is not an integer.
     MultiPhiValueError
-        For elements < 1, and what LinearStructure raises.
+        For elements < 1, and for arguments that LinearStructure refuses.
 
     Examples
     --------
@@ -120,9 +120,9 @@ def beam_deflections(beam: Beam, elements: int = 57) -> tuple[np.ndarray, np.nda
 
 
 def _dof_rows(beam: Beam, nodes: np.ndarray) -> np.ndarray:
-    """Rows (2 k, n) of (w, theta) of every node in the free DoFs; zero where a rigid clamp holds."""
-    held = [dof for dof, spring in enumerate((beam.clamp.translation, beam.clamp.rotation)) if math.isinf(spring)]
-    return np.delete(np.eye(2 * len(nodes)), held, axis=1)
+    """Rows (2 k, n) of (w, theta) of every node in the free DoFs; zero for those that a rigid clamp fixes."""
+    fixed = [dof for dof, spring in enumerate((beam.clamp.translation, beam.clamp.rotation)) if math.isinf(spring)]
+    return np.delete(np.eye(2 * len(nodes)), fixed, axis=1)
 
 
 def _node_at(nodes: np.ndarray, x: float) -> int:

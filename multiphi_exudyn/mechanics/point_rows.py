@@ -11,13 +11,13 @@ from multiphi_exudyn.display import names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mathematics.round_off import all_finite
 from multiphi_exudyn.mechanics.arguments import FLOAT, real_array
-from multiphi_exudyn.mechanics.dofs import DofTable, known
+from multiphi_exudyn.mechanics.dofs import DofTable, required_table
 
 __all__ = ["PointRows", "checked_vector", "point_rows"]
 
 
 class PointRows(Mapping[str, np.ndarray]):
-    """Rows (n,) by name, made when asked for: kept are the entries that are not zero, (places, values) each."""
+    """Rows (n,) by name, built on access from their nonzero entries (indices, values)."""
 
     def __init__(self, n: int, entries: dict[str, tuple[np.ndarray, np.ndarray]]) -> None:
         self.n = n
@@ -25,8 +25,8 @@ class PointRows(Mapping[str, np.ndarray]):
 
     def __getitem__(self, name: str) -> np.ndarray:
         row = np.zeros(self.n)
-        places, values = self._entries[name]
-        row[places] = values
+        indices, values = self._entries[name]
+        row[indices] = values
         row.flags.writeable = False
         return row
 
@@ -42,20 +42,20 @@ class PointRows(Mapping[str, np.ndarray]):
     def __repr__(self) -> str:
         return f"<rows of {self.n} degrees of freedom, by point: {names(list(self))}>"
 
-    def taken(self, moving: np.ndarray) -> PointRows:
-        """The rows of these degrees of freedom alone; refused of a point that cannot move without the others."""
+    def restricted_to(self, moving: np.ndarray) -> PointRows:
+        """Rows of these degrees of freedom alone; raise for a point that moves with the others only."""
         entries = {}
         for name in self:
             row = self[name]
             if np.any(row) and not np.any(row[moving]):
                 raise MultiPhiValueError(f"points[{name!r}]: got a place that is fixed, need one that can move")
-            places = np.flatnonzero(row[moving])
-            entries[name] = places, row[moving][places]
+            indices = np.flatnonzero(row[moving])
+            entries[name] = indices, row[moving][indices]
         return PointRows(len(moving), entries)
 
 
 def point_rows(given: Any, n: int, dofs: DofTable | None) -> PointRows:
-    """The rows of points given by degrees of freedom, places at nodes, or rows (n,)."""
+    """Rows of points from degrees of freedom, (node, component), or rows (n,)."""
     if isinstance(given, PointRows) and given.n == n:
         return given
     if not isinstance(given, Mapping):
@@ -68,19 +68,19 @@ def _point_entries(name: str, given: Any, n: int, dofs: DofTable | None) -> tupl
     if not isinstance(name, str) or not name:
         raise MultiPhiTypeError(f"points: got the name {name!r}, need a non-empty string")
     if isinstance(given, tuple) and len(given) == 2 and (n != 2 or dofs is not None or isinstance(given[1], str)):
-        called = f"points[{name!r}]"
-        return np.array([known(called, dofs).place(called, *given)]), np.ones(1)
+        label = f"points[{name!r}]"
+        return np.array([required_table(label, dofs).place(label, *given)]), np.ones(1)
     if isinstance(given, (int, np.integer)) and not isinstance(given, bool):
         if not 0 <= given < n:
             raise MultiPhiValueError(f"points[{name!r}]: got DoF {given}, need 0 <= DoF < {n}")
         return np.array([given]), np.ones(1)
     row = checked_vector(f"points[{name!r}]", given, n)
-    places = np.flatnonzero(row)
-    return places, row[places]
+    indices = np.flatnonzero(row)
+    return indices, row[indices]
 
 
 def checked_vector(name: str, given: Any, n: int) -> np.ndarray:
-    """(n,) finite numbers, what is given itself where it is an array of them; an error calls them by the name."""
+    """``given`` as finite (n,) numbers, not copied if it is a float array; name: of the argument, for errors."""
     is_float = type(given) is np.ndarray and given.dtype == FLOAT
     vector: np.ndarray = given if is_float else real_array(name, given, f"an ({n},) array of real numbers")
     if vector.shape != (n,):

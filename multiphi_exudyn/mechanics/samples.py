@@ -1,4 +1,4 @@
-"""Samples: a function of time that is given by its values, in straight lines between them."""
+"""Samples: a function of time by its values, with straight lines between them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from multiphi_exudyn.mechanics.arguments import is_real, real_array
 
 __all__ = ["Sampled"]
 
-COLLINEAR = 4 * np.finfo(float).eps  # of the largest sample: one that is nearer to a line lies on it
+COLLINEAR = 4 * np.finfo(float).eps  # of the largest sample: a sample this close to a line lies on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,15 +27,15 @@ class Sampled:
     time : array (k,)
         Ascending times [s], two or more.
     values : array (k,)
-        In the unit of what it moves.
+        Values, in m for a motion or N for a force.
 
     Raises
     ------
     MultiPhiTypeError
-        For what are no real numbers.
+        For values that are not real numbers.
     MultiPhiValueError
-        For fewer than two samples, as many times as values not given, times that do not ascend, values that are not
-        finite.
+        For fewer than two samples, unequal numbers of times and values, times that do not ascend, and values that are
+        not finite.
 
     Examples
     --------
@@ -71,14 +71,14 @@ class Sampled:
         Parameters
         ----------
         path : str or path
-            Of the file.
+            Path of the file.
         column : int, default 1
-            Which column holds the values, counted from 0.
+            Column of the values, counted from 0.
 
         Raises
         ------
         MultiPhiTypeError
-            For a column that is no whole number.
+            For a column that is not a whole number.
         MultiPhiValueError
             For a file or a column that cannot be read.
         """
@@ -96,13 +96,13 @@ class Sampled:
             raise MultiPhiValueError(f"samples: got {path}, need a CSV file of numbers: {cause}") from error
 
     def history(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
-        """The course up to ``end`` [s]; samples on the line of their neighbours make no piece of their own."""
+        """The function up to ``end`` [s]; samples on the line between their neighbours are left out."""
         bends = _bends(self.time, self.values)
         return PiecewiseExponential.sampled(self.time[bends], self.values[bends])
 
 
 def _bends(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Places of the samples between which all others lie on straight lines, but for round-off of the largest value."""
+    """Indices of the samples between which all others lie on straight lines, up to round-off of the largest value."""
     widths, round_off = np.diff(time), COLLINEAR * float(np.max(np.abs(values)))
     turns = np.abs(np.diff(np.diff(values) / widths)) > round_off * (1 / widths[1:] + 1 / widths[:-1])
     bends = np.flatnonzero(np.concatenate([[True], turns, [True]]))
@@ -111,7 +111,7 @@ def _bends(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def _samples(name: str, given: Any) -> np.ndarray:
-    """A copy (k,) of finite numbers that nobody can change."""
+    """A read-only copy (k,) of finite numbers."""
     values = np.asarray(real_array(f"samples {name}", given, "(k,) real numbers"))
     if values.ndim != 1:
         raise MultiPhiValueError(f"samples {name}: got shape {values.shape}, need (k,)")

@@ -26,7 +26,7 @@ class Section:
     Parameters
     ----------
     start, end : float
-        Where along the beam [m], start < end. The numbers that follow are given by name.
+        Positions along the beam [m], start < end. The following arguments are given by name.
     youngs_modulus : float
         E [Pa].
     density : float
@@ -43,7 +43,7 @@ class Section:
     Raises
     ------
     MultiPhiTypeError
-        For what are no numbers.
+        For values that are not numbers.
     MultiPhiValueError
         For start >= end, and for a property that is not finite and > 0.
 
@@ -85,14 +85,14 @@ class Section:
         density: float,
         poisson_ratio: float = 0.3,
     ) -> Section:
-        """A rectangle, whose shear modulus follows from the Poisson ratio: G = E / (2 (1 + nu)).
+        """A section with a rectangular area, whose shear modulus follows from the Poisson ratio: G = E / (2 (1 + nu)).
 
         Parameters
         ----------
         start, end : float
-            Where along the beam [m].
+            Positions along the beam [m].
         width, height : float
-            Of the rectangle [m], height along z, in which the beam bends.
+            Sides of the rectangle [m], height along z, in which the beam bends.
         youngs_modulus : float
             E [Pa].
         density : float
@@ -142,7 +142,7 @@ def element_stiffness(section: Section, length: float) -> np.ndarray:
 
 
 def element_mass(section: Section, length: float) -> np.ndarray:
-    """M (4, 4), the integral of N^T rho A N + S^T rho I S over the element, by Gauss points that are exact for it."""
+    """M (4, 4), the integral of N^T rho A N + S^T rho I S over the element, by an exact Gauss quadrature."""
     phi = _shear_flexibility(section, length)
     abscissae, weights = np.polynomial.legendre.leggauss(4)  # exact to degree 7; the integrand has degree 6
     matrix = np.zeros((4, 4))
@@ -187,7 +187,7 @@ def _positive(name: str, value: float) -> float:
 
 
 def check_numbers(of: str, **values: Any) -> None:
-    """Raises MultiPhiTypeError for a value that is no number."""
+    """Raise MultiPhiTypeError for a value that is not a number."""
     for name, value in values.items():
         if not is_real(value):
             raise MultiPhiTypeError(f"{of} {name}: got {value!r}, need a number")

@@ -2,7 +2,7 @@
 
     f = p F,   f = M e g
 
-They belong to the asymptotic configuration of every level, so that they are exact for any number of modes.
+They are part of the asymptotic configuration of every level, so they are exact for any number of modes.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ __all__ = ["ConstantLoad", "Gravity", "StaticLoad"]
 class ConstantLoad:
     """A constant force at a point, f(t) = p force.
 
-    It belongs to the asymptotic configuration of every level, so it is exact for any number of modes.
+    It is part of the asymptotic configuration of every level, so it is exact for any number of modes.
 
     Parameters
     ----------
     at : str, mapping or array (n,)
-        p, where it acts: a point name, {point: coefficient} or a row.
+        p, point of the force: a point name, {point: coefficient} or a row.
     force : float
         [N], [N m] on a rotation.
 
     Raises
     ------
     MultiPhiTypeError
-        For a force that is no number.
+        For a force that is not a number.
     MultiPhiValueError
         For a force that is not finite.
 
@@ -78,7 +78,7 @@ class Gravity:
     Raises
     ------
     MultiPhiTypeError
-        For a direction that is one point or one number, and an acceleration that is no number.
+        For a direction that is one point or one number, and an acceleration that is not a number.
     MultiPhiValueError
         For an acceleration that is not finite.
 

@@ -3,7 +3,7 @@
     M x'' + C x' + K x = f(t),   x in R^n
 
 M [kg, kg m2] symmetric positive definite, K [N/m, N m] symmetric positive semidefinite (rigid-body
-modes are welcome), C [N s/m, N m s] symmetric positive semidefinite. A *point* is a row p of n
+modes are allowed), C [N s/m, N m s] symmetric positive semidefinite. A *point* is a row p of n
 numbers: its value is p.x, and a force F at it acts as p F.
 """
 
@@ -29,8 +29,8 @@ __all__ = ["At", "LinearStructure", "damping_matrix"]
 
 At: TypeAlias = "str | Mapping[str, float] | np.ndarray"  # point name, {point: coefficient}, or (n,) row
 
-NAMED = 3  # degrees of freedom that an error names beside the first
-ROUND_OFF = 1e-9  # of the largest entry: above what assembling in floating point leaves of a zero
+NAMED = 3  # further degrees of freedom that an error lists after the first
+ROUND_OFF = 1e-9  # of the largest entry: larger than the round-off of assembled zeros
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,36 +42,37 @@ class LinearStructure(Shown):
     A point is a row p of n numbers: its value is p.x, and a force F at it acts as p F. Two structures are equal only if
     they are the same object.
 
-    Memory of sparse matrices: some times their own, while they are checked. A model's base then has n numbers for each
-    of its coordinates, r + 8 and some for each contact and point, a few times while it is computed, and once the
-    factors of K. A plate of n = 98400, 3e6 entries in K, r = 20: 0.5 GB for matrices and mesh, at most 0.8 GB in all.
+    Memory with sparse matrices: several times that of the matrices while they are checked. The base of a model has n
+    numbers for each of its coordinates, r + 8 and some for each contact and point, a few times more during its
+    computation, and the factors of K once. A plate of n = 98400, 3e6 entries in K, r = 20: 0.5 GB for matrices and
+    mesh, at most 0.8 GB in all.
 
     Parameters
     ----------
     mass : array (n, n)
         M [kg, kg m2], dense or scipy.sparse, symmetric positive definite; kept as given, never modified.
     stiffness : array (n, n)
-        K [N/m, N m], dense or scipy.sparse, symmetric positive semidefinite; rigid-body modes are welcome.
+        K [N/m, N m], dense or scipy.sparse, symmetric positive semidefinite; rigid-body modes are allowed.
     damping : array (n, n), ModalDamping, RayleighDamping or None, default None
-        C [N s/m, N m s], symmetric positive semidefinite, or how it is made; None for no damping.
+        C [N s/m, N m s], symmetric positive semidefinite, or its definition by ratios; None for no damping.
     points : mapping of str to int, (int, str) or array (n,), default empty
         Name to degree of freedom, counted from 0, to (node, component) or to row p; afterwards name to row.
     dofs : sequence of (int, str or int), default None
-        What the rows of the matrices are: (node, component) of each, "ux", "uy", "uz", "rx", "ry", "rz" or 1 to 6.
-        None: not known. Afterwards a DofTable.
+        (node, component) of every row of the matrices, "ux", "uy", "uz", "rx", "ry", "rz" or 1 to 6; None if unknown.
+        Afterwards a DofTable.
     fixed : iterable of int or (int, str), default ()
-        What the supports hold: degrees of freedom, or with dofs (node, component) or (node, "all"). Matrices, points,
-        dofs and fixed itself are given in the numbering without supports; these rows and columns are then left out.
+        Degrees of freedom that supports fix, or with dofs (node, component) or (node, "all"). Matrices, points, dofs
+        and fixed itself are in the numbering without supports; the fixed rows and columns are then removed.
     free : array (n,), default empty
-        The degrees of freedom that are left, by their numbers without supports; follows from ``fixed``.
+        The remaining degrees of freedom, in the numbering without supports; follows from ``fixed``.
 
     Raises
     ------
     MultiPhiTypeError
-        For what are no real numbers or no names.
+        For values that are not real numbers, and names that are not strings.
     MultiPhiValueError
         For a wrong shape, a value that is not finite, an asymmetric matrix, a mass that is not positive definite, a
-        negative diagonal of stiffness or damping, and a degree of freedom that there is not.
+        negative diagonal of stiffness or damping, and a degree of freedom that does not exist.
 
     Examples
     --------
@@ -94,20 +95,20 @@ class LinearStructure(Shown):
         mass = _symmetric("mass", self.mass, None)
         total = mass.shape[0]
         dofs = None if self.dofs is None else dof_table(self.dofs, total)
-        held = fixed_dofs(fixed, total, dofs)
-        moving = np.setdiff1d(np.arange(total), held)
-        mass = _check_positive_definite(_without(held, moving, mass), moving, dofs)
-        stiffness = _semidefinite_diagonal("stiffness", self.stiffness, held, moving)
+        supported = fixed_dofs(fixed, total, dofs)
+        moving = np.setdiff1d(np.arange(total), supported)
+        mass = _check_positive_definite(_without(supported, moving, mass), moving, dofs)
+        stiffness = _semidefinite_diagonal("stiffness", self.stiffness, supported, moving)
         damping = self.damping
         if not (damping is None or isinstance(damping, (ModalDamping, RayleighDamping))):
-            damping = _semidefinite_diagonal("damping", damping, held, moving)
+            damping = _semidefinite_diagonal("damping", damping, supported, moving)
         rows = point_rows(self.points, total, dofs)
         checked = {
             "mass": mass,
             "stiffness": stiffness,
             "damping": damping,
-            "points": rows.taken(moving) if len(held) else rows,
-            "dofs": dofs if dofs is None or not len(held) else dofs.taken(moving),
+            "points": rows.restricted_to(moving) if len(supported) else rows,
+            "dofs": dofs if dofs is None or not len(supported) else dofs.restricted_to(moving),
             "free": self.free[moving] if len(self.free) else moving,
         }
         for name, value in checked.items():
@@ -125,9 +126,9 @@ class LinearStructure(Shown):
         yield "points", names(list(self.points))
 
     def row(self, at: At) -> np.ndarray:
-        """The row p (n,) of a point name, of {point: coefficient}, or of a row given as such.
+        """The row p (n,) of a point name, of {point: coefficient}, or of a row.
 
-        MultiPhiValueError for a point that there is not, MultiPhiTypeError for coefficients that are no numbers.
+        MultiPhiValueError for a point that does not exist, MultiPhiTypeError for coefficients that are not numbers.
         """
         if isinstance(at, str):
             if at not in self.points:
@@ -147,24 +148,24 @@ class LinearStructure(Shown):
         return np.array(list(self.points.values())).reshape(-1, self.n)
 
     def vector(self, name: str, given: Any) -> np.ndarray:
-        """``given`` as finite (n,) numbers, itself where it is an array of them; ``name`` is what an error calls it."""
+        """``given`` as finite (n,) numbers, not copied if it is a float array; name: of the argument, for errors."""
         return checked_vector(name, given, self.n)
 
 
 def damping_matrix(structure: LinearStructure) -> Matrix | None:
-    """C (n, n) [N s/m] of a structure's damping, however it is given; modal damping needs dense matrices."""
-    given = structure.damping
-    if isinstance(given, ModalDamping):
+    """C (n, n) [N s/m] of a structure's damping in any form; modal damping needs dense matrices."""
+    damping = structure.damping
+    if isinstance(damping, ModalDamping):
         if scipy.sparse.issparse(structure.mass) or scipy.sparse.issparse(structure.stiffness):
             raise MultiPhiValueError(
                 "damping: got ModalDamping of sparse matrices where the damping matrix C is needed, need dense matrices"
             )
         modes = complete_modes(structure.mass, structure.stiffness).turned(structure.point_rows)
         momenta = structure.mass @ modes.shapes
-        return (momenta * (2 * given.of(modes.count) * modes.omega)) @ momenta.T
-    if isinstance(given, RayleighDamping):
-        return given.alpha * structure.mass + given.beta * structure.stiffness
-    return given
+        return (momenta * (2 * damping.of(modes.count) * modes.omega)) @ momenta.T
+    if isinstance(damping, RayleighDamping):
+        return damping.alpha * structure.mass + damping.beta * structure.stiffness
+    return damping
 
 
 def _symmetric(name: str, given: Matrix, n: int | None) -> Matrix:
@@ -186,11 +187,11 @@ def _symmetric(name: str, given: Matrix, n: int | None) -> Matrix:
 
 
 def _asymmetry(matrix: Matrix) -> str:
-    """Which two entries differ most, and by how much."""
-    apart = scipy.sparse.coo_array(matrix - matrix.T)
-    worst = int(np.argmax(np.abs(apart.data)))
-    i, j = int(apart.row[worst]), int(apart.col[worst])
-    share = abs(apart.data[worst]) / _largest(matrix)
+    """Text about the two mirrored entries with the largest difference."""
+    skew = scipy.sparse.coo_array(matrix - matrix.T)
+    worst = int(np.argmax(np.abs(skew.data)))
+    i, j = int(skew.row[worst]), int(skew.col[worst])
+    share = abs(skew.data[worst]) / _largest(matrix)
     return f"got {matrix[i, j]:g} at {i, j} and {matrix[j, i]:g} at {j, i}, {share:.2g} of its largest entry apart"
 
 
@@ -198,18 +199,18 @@ def _largest(matrix: Matrix) -> float:
     return float(np.max(np.abs(matrix.data if scipy.sparse.issparse(matrix) else matrix), initial=0.0))
 
 
-def _without(held: np.ndarray, moving: np.ndarray, matrix: Matrix) -> Matrix:
-    """A matrix without the rows and columns that are held."""
-    if not len(held):
+def _without(supported: np.ndarray, moving: np.ndarray, matrix: Matrix) -> Matrix:
+    """A matrix without the rows and columns that supports fix."""
+    if not len(supported):
         return matrix
-    kept = matrix[moving][:, moving]
-    if not scipy.sparse.issparse(kept):
-        kept.flags.writeable = False
-    return kept
+    reduced = matrix[moving][:, moving]
+    if not scipy.sparse.issparse(reduced):
+        reduced.flags.writeable = False
+    return reduced
 
 
-def _semidefinite_diagonal(name: str, given: Matrix, held: np.ndarray, moving: np.ndarray) -> Matrix:
-    matrix = _without(held, moving, _symmetric(name, given, len(held) + len(moving)))
+def _semidefinite_diagonal(name: str, given: Matrix, supported: np.ndarray, moving: np.ndarray) -> Matrix:
+    matrix = _without(supported, moving, _symmetric(name, given, len(supported) + len(moving)))
     diagonal = matrix.diagonal()
     if np.any(diagonal < -ROUND_OFF * _largest(matrix)):
         worst = int(np.argmin(diagonal))
@@ -218,16 +219,16 @@ def _semidefinite_diagonal(name: str, given: Matrix, held: np.ndarray, moving: n
 
 
 def _check_positive_definite(mass: Matrix, moving: np.ndarray, dofs: DofTable | None) -> Matrix:
-    without = np.flatnonzero(mass.diagonal() <= 0)
-    if len(without):
-        also = f" and {len(without) - 1} more are 0 or less" if len(without) > 1 else ""
+    massless = np.flatnonzero(mass.diagonal() <= 0)
+    if len(massless):
+        also = f" and {len(massless) - 1} more are 0 or less" if len(massless) > 1 else ""
         raise MultiPhiValueError(
-            f"mass: diagonal entry {_entry(moving[without[0]], dofs)} is {mass.diagonal()[without[0]]:g}{also}"
-            f"{_first(moving[without[1:]], dofs)}, need values > 0: hold these (fixed=), give them a small mass, or "
+            f"mass: diagonal entry {_entry(moving[massless[0]], dofs)} is {mass.diagonal()[massless[0]]:g}{also}"
+            f"{_first(moving[massless[1:]], dofs)}, need values > 0: hold these (fixed=), give them a small mass, or "
             "condense them statically before, u = R u_m with R.T @ M @ R and R.T @ K @ R"
         )
     if scipy.sparse.issparse(mass):
-        return mass  # a factorisation would cost what the modes cost; they are checked when they are computed
+        return mass  # a factorisation is as expensive as the modes, whose computation checks the mass as well
     try:
         scipy.linalg.cholesky(mass, lower=True)
     except scipy.linalg.LinAlgError as error:
@@ -236,7 +237,7 @@ def _check_positive_definite(mass: Matrix, moving: np.ndarray, dofs: DofTable | 
 
 
 def _first(rows: np.ndarray, dofs: DofTable | None) -> str:
-    """ " (6 (rx of node 10), 7 (ry of node 10), ...)", the first NAMED of them; nothing of none."""
+    """Text " (6 (rx of node 10), 7 (ry of node 10), ...)" with the first NAMED rows; empty without rows."""
     named = [_entry(row, dofs) for row in rows[:NAMED]] + ["..."] * (len(rows) > NAMED)
     return f" ({', '.join(named)})" if named else ""
 

@@ -1,12 +1,12 @@
-"""Matrices as finite element programs write them as text: triplets of Abaqus and CalculiX, and Harwell-Boeing.
+"""Text matrices of finite element programs: triplets of Abaqus and CalculiX, and Harwell-Boeing.
 
     row column value                           Abaqus *MATRIX OUTPUT, FORMAT=COORDINATE; CalculiX .sti and .mas
     node, component, node, component, value    Abaqus *MATRIX OUTPUT, FORMAT=MATRIX INPUT or LABELS
     four lines of header, then columns         Harwell-Boeing and Rutherford-Boeing, assembled, real or integer: Ansys
                                                HBMAT, LS-DYNA, the SuiteSparse collection
 
-Rows and columns count from 1. Of a symmetric matrix one triangle is enough. scipy.io.hb_read takes no symmetric matrix,
-which those of structures are.
+Rows and columns count from 1. One triangle of a symmetric matrix is enough. scipy.io.hb_read does not read symmetric
+matrices, as those of structures are.
 
 Sources: Abaqus Analysis User's Guide, 10.3.1; I. S. Duff, R. G. Grimes, J. G. Lewis, Users' guide for the
 Harwell-Boeing sparse matrix collection, RAL-92-086, 1992.
@@ -32,27 +32,27 @@ HEADER = 4  # lines
 CARD = 14  # characters of a number in the header
 FORMAT = re.compile(r"\((?:(\d+)P,?)?(\d*)([IEDFG])(\d+)", re.IGNORECASE)
 TYPES = "RI", "SU", "A"  # real or integer; symmetric or unsymmetric; assembled
-EMPTY_ROWS = 100  # rows for every entry: more are a wrong row, and would take memory
+EMPTY_ROWS = 100  # rows for every entry: with more rows an index is wrong, and the matrix would take much memory
 
 
 @dataclass(frozen=True)
 class NodalMatrix:
-    """A matrix (n, n) that knows its rows by node and component."""
+    """A matrix (n, n) with the node and component of every row."""
 
     matrix: Matrix
     dofs: DofTable
 
     def in_rows(self, dofs: DofTable) -> Matrix:
-        """The matrix in the rows of another table that has all of its own."""
-        places = {row: place for place, row in enumerate(dofs.rows)}
-        own = np.array([places[row] for row in self.dofs.rows])
+        """The matrix in the rows of another table, which contains all its rows."""
+        indices = {row: index for index, row in enumerate(dofs.rows)}
+        own_rows = np.array([indices[row] for row in self.dofs.rows])
         entries = scipy.sparse.coo_array(self.matrix)
         size = (len(dofs.rows),) * 2
-        return scipy.sparse.csr_array((entries.data, (own[entries.row], own[entries.col])), shape=size)
+        return scipy.sparse.csr_array((entries.data, (own_rows[entries.row], own_rows[entries.col])), shape=size)
 
 
 def same_rows(matrices: Iterable[NodalMatrix]) -> DofTable:
-    """The table of all rows that any of these matrices has, by node and component."""
+    """Table of all rows of these matrices, by node and component."""
     return DofTable.of({row for matrix in matrices for row in matrix.dofs.rows})
 
 
@@ -72,11 +72,11 @@ def triplets(path: Path) -> Matrix | NodalMatrix:
         n = int(np.max(labels))
         if np.min(labels) < 1 or n > EMPTY_ROWS * len(lines):
             raise ValueError(f"its {len(lines)} entries are in rows and columns from {np.min(labels)} to {n}")
-        return _whole(scipy.sparse.csr_array((table[:, 2], (labels[:, 0] - 1, labels[:, 1] - 1)), shape=(n, n)))
-    own, places = np.unique(labels.reshape(-1, 2), axis=0, return_inverse=True)
-    dofs = DofTable(tuple(node_component("a line", pair) for pair in own.tolist()))
-    i, j = places.reshape(-1, 2).T
-    return NodalMatrix(_whole(scipy.sparse.csr_array((table[:, 4], (i, j)), shape=(len(own),) * 2)), dofs)
+        return _complete(scipy.sparse.csr_array((table[:, 2], (labels[:, 0] - 1, labels[:, 1] - 1)), shape=(n, n)))
+    own_rows, indices = np.unique(labels.reshape(-1, 2), axis=0, return_inverse=True)
+    dofs = DofTable(tuple(node_component("a line", pair) for pair in own_rows.tolist()))
+    i, j = indices.reshape(-1, 2).T
+    return NodalMatrix(_complete(scipy.sparse.csr_array((table[:, 4], (i, j)), shape=(len(own_rows),) * 2)), dofs)
 
 
 def harwell_boeing(path: Path) -> Matrix:
@@ -97,25 +97,25 @@ def harwell_boeing(path: Path) -> Matrix:
     for layout, length, count in zip(layouts, cards[:3], (columns + 1, entries, entries), strict=True):
         arrays.append(_fields(lines[first : first + length], layout, count))
         first += length
-    pointers, places = (array.astype(np.int64) - 1 for array in arrays[:2])
-    matrix = scipy.sparse.csc_array((arrays[2], places, pointers), shape=(rows, columns))
+    pointers, indices = (array.astype(np.int64) - 1 for array in arrays[:2])
+    matrix = scipy.sparse.csc_array((arrays[2], indices, pointers), shape=(rows, columns))
     matrix.check_format(full_check=True)  # indices outside of the shape are read as addresses
-    return _whole(scipy.sparse.csr_array(matrix)) if kind[1] == "S" else matrix
+    return _complete(scipy.sparse.csr_array(matrix)) if kind[1] == "S" else matrix
 
 
 def lines_of(path: Path) -> list[str]:
-    """The lines of a text file, packed or not, without empty ones and blanks at their ends."""
+    """Lines of a text file, compressed or not, without empty lines and blanks at both ends."""
     with gzip.open(path, "rt", encoding="latin-1") if path.suffix == ".gz" else path.open(encoding="latin-1") as file:
         return [line.strip() for line in file if line.strip()]
 
 
 def _numbers(line: str, count: int) -> list[int]:
-    """Numbers of a line of the header, after what it begins with; none is zero."""
+    """Numbers of a line of the header, after its first field; zero if missing."""
     return [int(line[CARD * k : CARD * (k + 1)].strip() or 0) for k in range(1, count + 1)]
 
 
 def _fields(lines: list[str], layout: str, count: int) -> np.ndarray:
-    """Numbers (count,): by the blanks between them where there are enough, else of fixed width, as they may touch."""
+    """Numbers (count,), separated by blanks or of fixed width without blanks."""
     form = FORMAT.search(layout.replace(" ", ""))
     if form is None or (form[1] and form[3].upper() == "F"):
         raise ValueError(f"its numbers have the format {layout.strip()!r}")
@@ -129,10 +129,10 @@ def _fields(lines: list[str], layout: str, count: int) -> np.ndarray:
     return np.char.replace(np.char.upper(np.array(fields, dtype=str)), "D", "E").astype(float)
 
 
-def _whole(matrix: Matrix) -> Matrix:
-    """A matrix (n, n), completed where only one of its triangles is given."""
-    beside = scipy.sparse.csr_array(matrix - scipy.sparse.diags_array(matrix.diagonal()))
-    beside.eliminate_zeros()
-    if beside.nnz and not (abs(beside) * abs(beside).T).nnz:
-        return scipy.sparse.csr_array(matrix + beside.T)
+def _complete(matrix: Matrix) -> Matrix:
+    """A matrix (n, n), with both triangles if only one is given."""
+    triangle = scipy.sparse.csr_array(matrix - scipy.sparse.diags_array(matrix.diagonal()))
+    triangle.eliminate_zeros()
+    if triangle.nnz and not (abs(triangle) * abs(triangle).T).nnz:
+        return scipy.sparse.csr_array(matrix + triangle.T)
     return matrix

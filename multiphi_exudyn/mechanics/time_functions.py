@@ -1,10 +1,10 @@
-"""Functions of time: how a load, a moving stop or a moving base goes with time.
+"""Functions of time of loads, moving stops and moving bases.
 
     u(t):   Harmonic, Sampled, Smooth, Sweep
 
-Each becomes a piecewise exponential (piecewise_exponential.py), to which the response is known in closed form. A
-harmonic and straight lines between samples are exact as they stand; a smooth function and a sweep are interpolated, to
-their tolerance.
+Each becomes a piecewise exponential (piecewise_exponential.py), for which the response is known in closed form. A
+harmonic and straight lines between samples are exact; a smooth function and a sweep are interpolated to their
+tolerance.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from multiphi_exudyn.mechanics.samples import Sampled
 __all__ = ["Harmonic", "Smooth", "Sweep", "TimeFunction", "check_numbers", "check_time_function"]
 
 SWEEPS = ("linear", "logarithmic")
-TIGHTEST = 1e-12  # tolerance of a course: below it lies the round-off of its polynomials
+TIGHTEST = 1e-12  # smallest tolerance, above the round-off of the polynomials
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Harmonic:
     Parameters
     ----------
     amplitude : float
-        In the unit of what it moves: m of a stop or a base, N of a force.
+        In m for a stop or a base, in N for a force.
     frequency_hz : float
         [Hz], >= 0.
     phase : float, default 0.0
@@ -44,7 +44,7 @@ class Harmonic:
     Raises
     ------
     MultiPhiTypeError
-        For what are no numbers.
+        For values that are not numbers.
     MultiPhiValueError
         For values that are not finite, and a frequency < 0.
 
@@ -65,7 +65,7 @@ class Harmonic:
             raise MultiPhiValueError(f"harmonic frequency_hz: got {self.frequency_hz!r}, need a frequency >= 0 Hz")
 
     def history(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
-        """The course up to ``end`` [s]."""
+        """The function up to ``end`` [s]."""
         return PiecewiseExponential.harmonic(self.amplitude, 2 * math.pi * self.frequency_hz, self.phase)
 
     def acceleration(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
@@ -75,24 +75,24 @@ class Harmonic:
 
 @dataclass(frozen=True)
 class Smooth:
-    """Function of time that is smooth but for single instants, given as a Python function.
+    """Function of time that is smooth except at single instants, as a Python function.
 
-    It is known by samples: what is shorter than 4.2e-5 of a run's length may not be seen, 1.1e-4 of it for a function
-    of single times, unless ``breaks`` enclose it.
+    It is sampled: a feature shorter than 4.2e-5 of a run's length may be missed (1.1e-4 for a function of single
+    times), unless ``breaks`` enclose it.
 
     Parameters
     ----------
     function : callable
-        u of time [s], of (k,) times or of single ones.
+        u as a function of time [s], of (k,) times or of single ones.
     tolerance : float, default 1e-9
-        Of the response, relative to its largest value; 1e-12 <= tolerance < 1.
+        Tolerance of the response, relative to its largest value; 1e-12 <= tolerance < 1.
     breaks : sequence of float, default ()
-        Instants [s] at which the function or a derivative jumps; those that are seen are found without.
+        Times [s] at which the function or a derivative jumps; jumps that show in the samples are found without.
 
     Raises
     ------
     MultiPhiTypeError
-        For what is no function, no number, or no sequence of times.
+        For arguments that are not a function, a number, or a sequence of times.
     MultiPhiValueError
         For a tolerance out of range; in a run, for a function that does not give finite numbers.
 
@@ -116,17 +116,19 @@ class Smooth:
         object.__setattr__(self, "breaks", _breaks(self.breaks))
 
     def history(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
-        """The course up to ``end`` [s], to tolerance / finer of its largest value."""
-        many = self._together(np.array([0.0, end])) is not None
-        seen = Samples.of(self._values, end, MANY_SAMPLES if many else FEW_SAMPLES)
-        return PiecewiseExponential.smooth(self._values, end, self.tolerance / finer * seen.largest, seen, self.breaks)
+        """The function up to ``end`` [s], to tolerance / finer of its largest value."""
+        vectorised = self._all_values(np.array([0.0, end])) is not None
+        samples = Samples.of(self._values, end, MANY_SAMPLES if vectorised else FEW_SAMPLES)
+        return PiecewiseExponential.smooth(
+            self._values, end, self.tolerance / finer * samples.largest, samples, self.breaks
+        )
 
     def acceleration(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
-        """u'' up to ``end`` [s], of the polynomials that stand for u: less certain than they are."""
+        """u'' up to ``end`` [s], of the polynomials that approximate u; less accurate than they are."""
         return self.history(end, finer).derivative.derivative
 
     def _values(self, times: np.ndarray) -> np.ndarray:
-        values = self._together(times)
+        values = self._all_values(times)
         if values is None:
             values = np.array([self._value(t) for t in times.tolist()])
         if not np.all(np.isfinite(values)):
@@ -134,12 +136,12 @@ class Smooth:
             raise MultiPhiValueError(f"function: gives a value that is not finite at t = {worst:g} s, need finite ones")
         return values.astype(float)
 
-    def _together(self, times: np.ndarray) -> np.ndarray | None:
-        """All values by one call, None for a function that takes one time only, as math.sin and branches do."""
+    def _all_values(self, times: np.ndarray) -> np.ndarray | None:
+        """All values by one call; None for a function of single times only, as with math.sin or branches."""
         try:
             values = np.asarray(self.function(times))
         except Exception:
-            return None  # whatever is wrong shows again with a single time
+            return None  # an error of the function will occur again with a single time
         return values if values.shape == times.shape and values.dtype.kind in "biuf" else None
 
     def _value(self, time: float) -> float:
@@ -166,20 +168,20 @@ class Sweep:
     Parameters
     ----------
     amplitude : float
-        In the unit of what it moves.
+        In m for a stop or a base, in N for a force.
     start_hz, end_hz : float
-        Frequencies [Hz] at its begin and its end, > 0.
+        Frequencies [Hz] at the start and the end, > 0.
     duration : float
         T [s], > 0.
     law : str, default "linear"
         "linear" or "logarithmic".
     tolerance : float, default 1e-9
-        Of the response, relative to its largest value; 1e-12 <= tolerance < 1.
+        Tolerance of the response, relative to its largest value; 1e-12 <= tolerance < 1.
 
     Raises
     ------
     MultiPhiTypeError
-        For what are no numbers.
+        For values that are not numbers.
     MultiPhiValueError
         For numbers out of these ranges, and another law.
 
@@ -200,9 +202,9 @@ class Sweep:
     tolerance: float = 1e-9
 
     def __post_init__(self) -> None:
-        given = {"start_hz": self.start_hz, "end_hz": self.end_hz, "duration": self.duration}
-        check_numbers("sweep", amplitude=self.amplitude, **given)
-        for name, value in given.items():
+        positive = {"start_hz": self.start_hz, "end_hz": self.end_hz, "duration": self.duration}
+        check_numbers("sweep", amplitude=self.amplitude, **positive)
+        for name, value in positive.items():
             if not value > 0:
                 raise MultiPhiValueError(f"sweep {name}: got {value!r}, need a value > 0")
         if not (isinstance(self.law, str) and self.law in SWEEPS):
@@ -210,25 +212,25 @@ class Sweep:
         _check_tolerance(self.tolerance)
 
     def frequency(self, t: np.ndarray) -> np.ndarray:
-        """f (k,) [Hz]."""
+        """Frequency f (k,) [Hz] at times (k,) [s]."""
         if self.law == "linear":
             return self.start_hz + (self.end_hz - self.start_hz) * (t / self.duration)
-        return np.asarray(self.start_hz * np.exp(self._octaves * (t / self.duration)))
+        return np.asarray(self.start_hz * np.exp(self._log_ratio * (t / self.duration)))
 
     def phase(self, t: np.ndarray) -> np.ndarray:
-        """2 pi integral of f (k,) [rad]."""
-        if self.law == "linear" or self._octaves == 0:
+        """Phase (k,) [rad], 2 pi times the integral of f."""
+        if self.law == "linear" or self._log_ratio == 0:
             cycles = (self.start_hz + (self.end_hz - self.start_hz) * (t / self.duration) / 2) * t
         else:
-            cycles = self.start_hz * self.duration / self._octaves * np.expm1(self._octaves * (t / self.duration))
+            cycles = self.start_hz * self.duration / self._log_ratio * np.expm1(self._log_ratio * (t / self.duration))
         return np.asarray(2 * math.pi * cycles)
 
     @property
-    def _octaves(self) -> float:
+    def _log_ratio(self) -> float:
         return math.log(self.end_hz / self.start_hz)
 
     def history(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
-        """The course up to ``end`` [s], to tolerance / finer of its amplitude."""
+        """The function up to ``end`` [s], to tolerance / finer of its amplitude."""
         return self._modulated(lambda t: np.full_like(t, self.amplitude), abs(self.amplitude), end, finer)
 
     def acceleration(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
@@ -237,7 +239,7 @@ class Sweep:
         def factor(t: np.ndarray) -> np.ndarray:
             omega = 2 * math.pi * self.frequency(t)
             linear = self.law == "linear"
-            rising = 2 * math.pi * (self.end_hz - self.start_hz) if linear else omega * self._octaves
+            rising = 2 * math.pi * (self.end_hz - self.start_hz) if linear else omega * self._log_ratio
             rate = rising / self.duration
             return np.asarray(self.amplitude * (1j * rate - omega**2))
 
@@ -256,8 +258,8 @@ class Sweep:
 TimeFunction: TypeAlias = "Harmonic | Sampled | Smooth | Sweep"
 
 
-def check_numbers(what: str, **given: float) -> None:
-    for name, value in given.items():
+def check_numbers(what: str, **values: float) -> None:
+    for name, value in values.items():
         if not is_real(value):
             raise MultiPhiTypeError(f"{what} {name}: got {value!r}, need a number")
         if not math.isfinite(value):

@@ -1,6 +1,6 @@
-"""Steady states: motions that repeat with a harmonic load, found on the map of one period.
+"""Steady states: motions that repeat with a harmonic load, from the map of one period.
 
-A frequency response is made of many of them, one after the other.
+A frequency response is a sequence of steady states.
 
 Order: settled_state, shooting, settling, steady_state, frequency_response.
 """

@@ -1,8 +1,8 @@
 """Frequency response of a structure with contacts: steady states under a harmonic load, one frequency after the other.
 
-Each frequency starts from the state that the one before has reached, as a stepped-sine test does, so where several
-responses attract the curve stays on its branch as long as there is one: frequencies going up and going down give
-different curves. Without contact both are the linear response, amplitude = |p.(K - omega^2 M + i omega C)^-1 b| F.
+Each frequency starts from the final state of the previous one, as in a stepped-sine test. So if there are several
+attractors, the curve stays on its branch as long as it exists, and ascending and descending frequencies give different
+curves. Without contact both are the linear response, amplitude = |p.(K - omega^2 M + i omega C)^-1 b| F.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.static_loads import StaticLoad
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.steady.settled_state import PeriodicLoad, SteadyState
-from multiphi_exudyn.steady.steady_state import at_frequency, settled
+from multiphi_exudyn.steady.steady_state import at_frequency, settle_run
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.warning_groups import grouped, issue, kept_back
 
@@ -33,9 +33,9 @@ class FrequencyResponse(Shown):
     Attributes
     ----------
     frequencies : array (k,)
-        In the order in which they were run [Hz].
+        Frequencies in the order of the runs [Hz].
     states : tuple of SteadyState
-        k of them.
+        Steady state of every frequency.
 
     Examples
     --------
@@ -61,14 +61,16 @@ class FrequencyResponse(Shown):
 
     @property
     def orders(self) -> np.ndarray:
-        """Periods of the load in one of the response (k,), 0 where it is not periodic."""
+        """Periods of the load in one period of the response (k,), 0 if it is not periodic."""
         return np.array([state.order for state in self.states])
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to distrust in the states, a sentence for each kind with the frequencies that have it."""
-        found = grouped((f"{hz:g} Hz", state.warnings) for hz, state in zip(self.frequencies, self.states, strict=True))
-        return tuple(group.told(len(self.states)) for group in found)
+        """Warnings of the states, a sentence for each kind with its frequencies."""
+        groups = grouped(
+            (f"{hz:g} Hz", state.warnings) for hz, state in zip(self.frequencies, self.states, strict=True)
+        )
+        return tuple(group.told(len(self.states)) for group in groups)
 
     @property
     def last(self) -> SteadyState:
@@ -76,11 +78,11 @@ class FrequencyResponse(Shown):
         return next((state for state in reversed(self.states) if state.status != "failed"), self.states[-1])
 
     def amplitude(self, point: At) -> np.ndarray:
-        """Half the range (k,) [m] of a point in a period of the load, the mean over those kept; NaN where failed."""
+        """Half the range (k,) [m] of a point in a period of the load, a mean over recorded periods; NaN if failed."""
         return np.array([np.mean(state.amplitudes(point)) for state in self.states])
 
     def duty(self, contact: str) -> np.ndarray:
-        """Part of the time (k,) that a contact is closed; NaN where failed."""
+        """Part of the time (k,) in which a contact is closed; NaN if failed."""
         return np.array([state.duty(contact) for state in self.states])
 
 
@@ -98,42 +100,41 @@ def frequency_response(
 ) -> FrequencyResponse:
     """Steady states under a harmonic load, one frequency after the other.
 
-    Each starts from the state that the one before has reached, as a stepped-sine test does, so where several responses
-    attract the curve stays on its branch as long as there is one: going up and going down give different curves.
-    Without contact both are the linear response, amplitude = |p.(K - omega^2 M + i omega C)^-1 b| F.
+    Each frequency starts from the final state of the previous one, as in a stepped-sine test. So if there are several
+    attractors, the curve stays on its branch as long as it exists, and ascending and descending frequencies give
+    different curves. Without contact both are the linear response, amplitude = |p.(K - omega^2 M + i omega C)^-1 b| F.
 
     Parameters
     ----------
     model : MultiPhiModel
-        Structure and contacts; one with a ``Tolerance`` has to be decided, by a run of ``simulate``.
+        Structure and contacts; a ``Tolerance`` needs a run of ``simulate`` before, which determines the modes.
     load : HarmonicLoad or BaseMotion
-        Whose frequency is replaced.
+        The harmonic load, whose frequency is replaced.
     frequencies : array (k,)
-        In the order in which they are run [Hz], > 0.
+        Frequencies in the order of the runs [Hz], > 0.
     displacement, velocity : array (n,), default None
-        x [m, rad] and x' [m/s, rad/s] that the first one starts from, None for zero.
+        x [m, rad] and x' [m/s, rad/s] at the start of the first run, None for zero.
     other_loads : sequence of ConstantLoad and Gravity, default ()
-        That act as well.
+        Static loads that act as well.
     periods : int, default 400
-        Of the load, after which a run that has not settled ends.
+        Number of periods of the load after which a run that has not settled ends.
     tolerance : float, default 1e-6
-        Relative to the size of the motion, to which states repeat.
+        Tolerance to which states repeat, relative to the size of the motion.
     start : Trajectory or Equilibrium, default None
-        What the first one starts from instead, as in ``simulate``.
+        Start of the first run instead of a displacement, as in ``simulate``.
 
     Returns
     -------
     FrequencyResponse
-        A frequency at which the run fails is a state with that status; the next one starts where the failed one did. A
-        MultiPhiWarning is issued for each kind of warning that states have.
+        If the run of a frequency fails, its state has the status "failed", and the next frequency has the same start.
+        A MultiPhiWarning is issued for each kind of warning of the states.
 
     Raises
     ------
     MultiPhiTypeError
         For arguments of another kind, and a BaseMotion that is not Harmonic.
     MultiPhiValueError
-        For frequencies that are not > 0, a model with a Tolerance that has not decided, and periods or a tolerance out
-        of range.
+        For frequencies that are not > 0, a model with an undecided Tolerance, and periods or a tolerance out of range.
 
     Examples
     --------
@@ -154,7 +155,7 @@ def frequency_response(
     begin: tuple[np.ndarray | None, np.ndarray | None, Trajectory | Equilibrium | None] = displacement, velocity, start
     with kept_back():
         for hz in _frequencies(frequencies):
-            state = settled(model, at_frequency(load, hz), begin, other_loads, periods, tolerance)
+            state = settle_run(model, at_frequency(load, hz), begin, other_loads, periods, tolerance)
             states.append(state)
             if state.status != "failed":
                 begin = None, None, state.trajectory

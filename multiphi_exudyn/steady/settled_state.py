@@ -1,4 +1,4 @@
-"""A steady state: where a run under a harmonic load has settled, and what is read from it."""
+"""Settled state: the steady state of a run under a harmonic load, with its amplitudes and contact times."""
 
 from __future__ import annotations
 
@@ -20,42 +20,41 @@ from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["HIGHEST_ORDER", "SAMPLES", "PeriodicLoad", "SteadyState", "course_of", "frequency"]
 
-HIGHEST_ORDER = 8  # of a sub-harmonic response that is looked for
-SAMPLES = 64  # of a period of the load, for the size of the motion; HIGHEST_ORDER times as many to look for extremes
-ZOOM = 32  # samples between the neighbours of an extreme,
-ZOOMS = 3  # so often: the extreme is then known to the square of (2 / ZOOM)^ZOOMS / SAMPLES
+HIGHEST_ORDER = 8  # highest order of a sub-harmonic response
+SAMPLES = 64  # per period of the load, for the size of the motion; HIGHEST_ORDER times as many for extremes
+ZOOM_SAMPLES = 32  # samples between the neighbours of an extreme, in every step of the refinement
+ZOOM_STEPS = 3  # of the refinement: the error of an extreme is of the order ((2 / ZOOM_SAMPLES)^ZOOM_STEPS / SAMPLES)^2
 PeriodicLoad: TypeAlias = "HarmonicLoad | BaseMotion"
 
 
 @dataclass(frozen=True, repr=False)
 class SteadyState(Shown):
-    """Result of ``steady_state``: where a run under a harmonic load has settled.
+    """Result of ``steady_state``: the steady state of a run under a harmonic load.
 
     Attributes
     ----------
     status : str
         "periodic", "not settled" or "failed".
     message : str
-        The cause of the latter two.
+        Cause if the state is not periodic, else empty.
     load : HarmonicLoad or BaseMotion
-        Of the run.
+        Load of the run.
     order : int
-        Periods of the load in one of the response, 2 and more for a sub-harmonic one, 0 where it is not periodic.
+        Periods of the load in one period of the response, 2 and more for a sub-harmonic one, 0 if it is not periodic.
     residual : float
-        By how much states ``order`` periods apart differ, relative to the size of the motion, both in sqrt(energy);
-        where it is not periodic the smallest over all orders.
+        Difference of states ``order`` periods apart, relative to the size of the motion, both in sqrt(energy); if it is
+        not periodic, the smallest of all orders.
     multiplier : float
-        The largest modulus by which a small disturbance grows in a period of the load; NaN where the run settled by
-        itself. Friction that never slips has no part in it.
+        Largest growth factor of a small disturbance in a period of the load; NaN if the run settled without Newton's
+        method. Stick positions of friction that never slips are left out.
     periods : int
-        Of the load, run one after the other.
+        Number of periods of the load in the run.
     trajectory : Trajectory
-        One period of the response, or the last 16 periods of the load where it is not periodic; a failed run ends
-        early.
+        One period of the response, or the last 16 periods of the load if it is not periodic; a failed run ends early.
     displacement, velocity : array (n,)
-        x [m, rad] and x' [m/s, rad/s] at the end of the run: another one can go on from there.
+        x [m, rad] and x' [m/s, rad/s] at the end of the run, from which another run can continue.
     warnings : tuple of str
-        What to distrust in the trajectory, and kinds that only runs before it had, which the sentence then says.
+        Warnings about the accuracy of the trajectory, and of earlier chunks of the run.
 
     Examples
     --------
@@ -93,20 +92,20 @@ class SteadyState(Shown):
         yield "warnings", kinds(self.warnings)
 
     def amplitude(self, point: At) -> float:
-        """Half the difference between the largest and the smallest displacement [m] of a point; NaN where failed."""
+        """Half the range of the displacement [m] of a point; NaN if failed."""
         if self.status == "failed":
             return math.nan
         return _half_range(self.trajectory, point, 0.0, self.trajectory.t_end)
 
     def amplitudes(self, point: At) -> np.ndarray:
-        """Half the range [m] of a point in every period of the load in the trajectory, (k,); NaN where failed."""
+        """Half the range (k,) of the displacement [m] of a point in every period of the trajectory; NaN if failed."""
         if self.status == "failed":
             return np.array([math.nan])
         ends = np.linspace(0.0, self.trajectory.t_end, 1 + max(1, round(self.trajectory.t_end * frequency(self.load))))
-        return np.array([_half_range(self.trajectory, point, *given) for given in itertools.pairwise(ends.tolist())])
+        return np.array([_half_range(self.trajectory, point, *period) for period in itertools.pairwise(ends.tolist())])
 
     def duty(self, contact: str) -> float:
-        """Part of the time that a contact is closed, 0 to 1; NaN where failed."""
+        """Part of the time in which a contact is closed, 0 to 1; NaN if failed."""
         if self.status == "failed":
             return math.nan
         intervals = self.trajectory.contact_intervals(contact)
@@ -114,28 +113,28 @@ class SteadyState(Shown):
 
 
 def _half_range(trajectory: Trajectory, point: At, start: float, end: float) -> float:
-    """Half the range of a point's displacement, sampled ever closer around the largest and the smallest sample."""
+    """Half the range of a point's displacement, with refined sampling around the largest and the smallest sample."""
     return sum(_largest(trajectory, point, sign, start, end) for sign in (1.0, -1.0)) / 2
 
 
 def _largest(trajectory: Trajectory, point: At, sign: float, start: float, end: float) -> float:
-    """The largest value, times ``sign``: of a periodic motion it may lie just inside either end as well."""
+    """Largest value of sign times the displacement; in a periodic motion it may also lie next to either end."""
     times = np.linspace(start, end, SAMPLES * HIGHEST_ORDER + 1)
     highest = int(np.argmax(sign * np.asarray(trajectory.at(point, times))))
     return max(_peak(trajectory, point, sign, times, k) for k in {0, highest, len(times) - 1})
 
 
 def _peak(trajectory: Trajectory, point: At, sign: float, times: np.ndarray, k: int) -> float:
-    """The largest value between the neighbours of the k-th of these times."""
-    for _ in range(ZOOMS):
-        times = np.linspace(times[max(k - 1, 0)], times[min(k + 1, len(times) - 1)], ZOOM + 1)
+    """Largest value between the neighbours of the k-th of these times."""
+    for _ in range(ZOOM_STEPS):
+        times = np.linspace(times[max(k - 1, 0)], times[min(k + 1, len(times) - 1)], ZOOM_SAMPLES + 1)
         values = sign * np.asarray(trajectory.at(point, times))
         k = int(np.argmax(values))
     return float(values[k])
 
 
 def frequency(load: PeriodicLoad) -> float:
-    """Of the load [Hz]."""
+    """Frequency of a load [Hz]."""
     return course_of(load).frequency_hz
 
 

@@ -1,15 +1,15 @@
-"""Steady state: where a run under a harmonic load settles, found on the map of one period of the load.
+"""Steady state: the response to which a run under a harmonic load settles, from the map of one period of the load.
 
 The state at whole periods T of the load is a sequence, q = (s y, y', F / sqrt(k)) with s = max(omega, 2 pi / T), y in
 base coordinates, F the forces of springs k in series with friction,
 
     q_k+1 = P(q_k)
 
-A response of order p repeats after p periods, P^p(q) = q: 1 is a periodic response, 2 and more a sub-harmonic one. The
-run goes on from chunk to chunk of periods until the states repeat to a tolerance; that test decides. What decays slowly
-is not waited for: between chunks Newton's method looks for the repeating state (shooting.py), and the next chunk starts
-there, if the state attracts. Everything is handed on from chunk to chunk, places that friction holds too. Where a link
-sticks for ever, to every such place belongs another response; found is that to which the start leads.
+A response of order p repeats after p periods, P^p(q) = q: p = 1 is a periodic response, p > 1 a sub-harmonic one. The
+run continues in chunks of periods until the states repeat to a tolerance. To save time with slowly decaying motions,
+Newton's method searches for the repeating state between chunks (shooting.py), and if it is an attractor the next chunk
+starts there. A chunk takes over the whole final state of the previous one, stick positions included. If a link sticks
+for ever, every stick position belongs to another response; the result is the one to which the start leads.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.loads import HarmonicLoad
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity, StaticLoad
 from multiphi_exudyn.steady.settled_state import PeriodicLoad, SteadyState, course_of, frequency
-from multiphi_exudyn.steady.settling import CHUNK, Search, warned
+from multiphi_exudyn.steady.settling import CHUNK, Search, with_warnings
 from multiphi_exudyn.steady.shooting import PeriodMap
 from multiphi_exudyn.time.simulate import Run, holding, outside_of, started
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.warning_groups import issue, kept_back
 
-__all__ = ["at_frequency", "settled", "steady_state"]
+__all__ = ["at_frequency", "settle_run", "steady_state"]
 
-TIGHTEST = 1e-12  # tolerance: below it lies the round-off of a period
+TIGHTEST = 1e-12  # smallest tolerance, above the round-off of a period
 
 
 def steady_state(
@@ -49,31 +49,31 @@ def steady_state(
     tolerance: float = 1e-6,
     start: Trajectory | Equilibrium | None = None,
 ) -> SteadyState:
-    """The response that a run under a harmonic load settles to.
+    """Steady state of a run under a harmonic load.
 
         q_k+1 = P(q_k),   P^p(q) = q
 
-    q is the state at whole periods of the load, P one period of the run, p the order of the response. The run goes on
-    until states repeat; what decays slowly is not waited for, but found by Newton's method from where the run is. Which
-    response, where several attract, follows from the start: places that friction holds are part of it, and only
-    ``start`` hands them on.
+    q is the state at whole periods of the load, P one period of the run, p the order of the response. The run continues
+    until the states repeat; for slowly decaying motions Newton's method finds the repeating state from the present one.
+    If there are several attractors, the start determines the response; the start includes stick positions of friction,
+    which only ``start`` can give.
 
     Parameters
     ----------
     model : MultiPhiModel
-        Structure and contacts; one with a ``Tolerance`` has to be decided, by a run of ``simulate``.
+        Structure and contacts; a ``Tolerance`` needs a run of ``simulate`` before, which determines the modes.
     load : HarmonicLoad or BaseMotion
-        A base motion with a Harmonic course.
+        The harmonic load; a base motion needs a Harmonic course.
     displacement, velocity : array (n,), default None
         x [m, rad] and x' [m/s, rad/s] at t = 0, None for zero.
     other_loads : sequence of ConstantLoad and Gravity, default ()
-        That act as well.
+        Static loads that act as well.
     periods : int, default 400
-        Of the load, after which a run that has not settled ends.
+        Number of periods of the load after which a run that has not settled ends.
     tolerance : float, default 1e-6
-        Relative to the size of the motion, to which states repeat; 1e-12 at least.
+        Tolerance to which states repeat, relative to the size of the motion; at least 1e-12.
     start : Trajectory or Equilibrium, default None
-        What it starts from instead, as in ``simulate``; time begins anew.
+        Start of the run instead of a displacement, as in ``simulate``; time begins anew.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def steady_state(
     MultiPhiTypeError
         For arguments of another kind, and a BaseMotion that is not Harmonic.
     MultiPhiValueError
-        For a frequency of zero, a model with a Tolerance that has not decided, and periods or a tolerance out of range.
+        For a frequency of zero, a model with an undecided Tolerance, and periods or a tolerance out of range.
 
     Examples
     --------
@@ -101,12 +101,12 @@ def steady_state(
     ('periodic', 1.76)
     """
     with kept_back():
-        state = settled(model, load, (displacement, velocity, start), other_loads, periods, tolerance)
+        state = settle_run(model, load, (displacement, velocity, start), other_loads, periods, tolerance)
     issue(state.warnings)
     return state
 
 
-def settled(
+def settle_run(
     model: MultiPhiModel,
     load: PeriodicLoad,
     begin: tuple[np.ndarray | None, np.ndarray | None, Trajectory | Equilibrium | None],
@@ -114,17 +114,17 @@ def settled(
     periods: int,
     tolerance: float,
 ) -> SteadyState:
-    """What ``steady_state`` gives, without its MultiPhiWarning; begin: x, x' (n,) and its ``start``."""
+    """Result of ``steady_state`` without its MultiPhiWarning; begin: x, x' (n,) and ``start``."""
     _check(model, load, other_loads, periods, tolerance)
     (displacement, velocity, start), loads, period = begin, (load, *other_loads), 1.0 / frequency(load)
     model = holding(model.decided or model, loads, start)
     run = started(Run(model, CHUNK * period, displacement, velocity, loads, start=start, rewound=True))
     search = Search(PeriodMap(model, loads, period), load, tolerance, outside_of(run, model))
-    return search.settle(warned(run.trajectory()), periods)
+    return search.settle(with_warnings(run.trajectory()), periods)
 
 
 def at_frequency(load: PeriodicLoad, frequency_hz: float) -> PeriodicLoad:
-    """The same load at another frequency."""
+    """The load with another frequency [Hz]."""
     if isinstance(load, HarmonicLoad):
         return replace(load, frequency_hz=frequency_hz)
     return replace(load, course=replace(course_of(load), frequency_hz=frequency_hz))

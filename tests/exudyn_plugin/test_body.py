@@ -325,7 +325,7 @@ def test_conditions_of_a_step_are_kept_by_all_that_they_depend_on():
     for matched, step, carried in ((None, 1e-3, 0.0), (1e-3, 1e-3, 0.0), (None, 2e-3, 0.0), (None, 1e-3, 1.0)):
         loads = kept, OwnLoads(chain(contacts), (), 3, 0.0, 1.0)
         direct = np.full((1, 1), carried)
-        ours, anew = (each.conditions(each.stepped((1,), matched), step, direct) for each in loads)
+        ours, anew = (each.conditions(each.stepped_level((1,), matched), step, direct) for each in loads)
         assert np.array_equal(ours.ahead, anew.ahead)
         assert not any(np.array_equal(ours.ahead, other) for other in found)
         found.append(ours.ahead)

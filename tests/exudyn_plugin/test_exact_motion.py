@@ -11,8 +11,8 @@ from multiphi_exudyn.events import level_arrays
 from multiphi_exudyn.exudyn_plugin.coupling import exact_motion
 from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedInertia, PointInertia
 from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import ExactMotion
-from multiphi_exudyn.exudyn_plugin.coupling.interface import _reactions
-from multiphi_exudyn.exudyn_plugin.coupling.modal_force import Acting
+from multiphi_exudyn.exudyn_plugin.coupling.interface import _direct_reactions
+from multiphi_exudyn.exudyn_plugin.coupling.modal_force import LevelForces
 from multiphi_exudyn.time import chatter
 from multiphi_exudyn.time.loop import advance
 from multiphi_exudyn.time.simulate import Run
@@ -46,7 +46,7 @@ def held(model, row, force):
     def acting(states):
         level = model.level_at(model.links_held(states))
         rows = in_base @ level.vectors
-        return Acting(force * rows[0], force * _reactions(level, in_base, rows)[:, 0])
+        return LevelForces(force * rows[0], force * _direct_reactions(level, in_base, rows)[:, 0])
 
     return acting
 
@@ -59,7 +59,7 @@ def test_a_force_on_the_modes_of_every_level_is_a_load(case):
     native = mp.simulate(model, T_END, velocity=velocity, loads=[mp.ConstantLoad(at, force)])
     motion = Run(model, T_END, None, velocity).begun()
     exact = ExactMotion(motion, motion.levels, "body", 0.0)
-    exact.hold(held(model, structure.row(at), force), None)
+    exact.set_forces(held(model, structure.row(at), force), None)
     found = exact.advance(motion.static_state, 0.0, T_END)
     assert len(native.events) >= 3
     assert [(e.contact, e.kind) for e in exact.events] == [(e.contact, e.kind) for e in native.events]
@@ -79,10 +79,10 @@ def test_forces_may_change_on_the_way_and_a_trial_leaves_no_trace(case):
     native = mp.simulate(model, T_END, velocity=velocity, loads=loads)
     motion = Run(model, T_END, None, velocity).begun()
     exact, row = ExactMotion(motion, motion.levels, "body", 0.0), structure.row(at)
-    exact.hold(held(model, row, force), None)
+    exact.set_forces(held(model, row, force), None)
     exact.advance(motion.static_state, 0.0, 3.0, stop=True, trial=True)
     first = exact.advance(motion.static_state, 0.0, 3.0)
-    exact.hold(held(model, row, -force / 2), None)
+    exact.set_forces(held(model, row, -force / 2), None)
     then = exact.advance(first.state, 3.0, T_END)
     times = [event.time for event in exact.events]
     assert times == pytest.approx([event.time for event in native.events], rel=1e-8)
@@ -95,14 +95,14 @@ def test_a_motion_stops_at_its_first_event_and_says_what_was_right_before():
     model = mp.MultiPhiModel(structure, contacts, modes="all")
     motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
     exact = ExactMotion(motion, motion.levels, "body", 0.0)
-    exact.hold(held(model, structure.row(at), force), None)
+    exact.set_forces(held(model, structure.row(at), force), None)
     reached = exact.advance(motion.static_state, 0.0, T_END, stop=True)
     assert reached.changed
     assert {event.time for event in exact.events} == {reached.time}
     level = model.level_at(())
-    assert level.gap_rows[0] @ reached.before.velocity < 0
-    assert 0.1 + level.gap_rows[0] @ reached.before.displacement == pytest.approx(0.0, abs=1e-12)
-    assert not math.isclose(reached.state.kinetic, reached.before.kinetic)
+    assert level.gap_rows[0] @ reached.state_before.velocity < 0
+    assert 0.1 + level.gap_rows[0] @ reached.state_before.displacement == pytest.approx(0.0, abs=1e-12)
+    assert not math.isclose(reached.state.kinetic, reached.state_before.kinetic)
 
 
 def test_arrays_that_have_become_too_large_are_packed_anew(monkeypatch):
@@ -115,7 +115,7 @@ def test_arrays_that_have_become_too_large_are_packed_anew(monkeypatch):
         motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
         exact, state = ExactMotion(motion, motion.levels, "body", 0.0), motion.static_state
         for k in range(6):
-            exact.hold(held(model, structure.row(at), force), None)
+            exact.set_forces(held(model, structure.row(at), force), None)
             state = exact.advance(state, float(k), float(k + 1)).state
         found.append((state, exact.events))
     (one, before), (other, after) = found
@@ -139,7 +139,7 @@ def test_bodies_that_take_turns_move_as_each_one_alone(case):
         exact, state = ExactMotion(motion, motion.levels, "body", 0.0), motion.static_state
         for k in range(30):
             t = 0.2 * k
-            exact.hold(held(model, row, size * force * (1 - t / T_END)), inertia if size > 1 else None)
+            exact.set_forces(held(model, row, size * force * (1 - t / T_END)), inertia if size > 1 else None)
             exact.advance(state, t, t + 0.2, trial=True)
             state = exact.advance(state, t, t + 0.2).state
             yield state.displacement, state.velocity, [event.time for event in exact.events]
@@ -171,7 +171,7 @@ def test_chatter_is_that_of_one_body_alone(monkeypatch):
         motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
         bodies.append((ExactMotion(motion, motion.levels, "body", 0.0), motion.static_state))
     for exact, state in bodies:
-        exact.hold(held(model, structure.row(at), force), None)
+        exact.set_forces(held(model, structure.row(at), force), None)
         exact.advance(state, 0.0, 2.0)
         assert len(exact.events) == 2
 
@@ -181,7 +181,7 @@ def test_a_failure_says_whose_it_is_and_when():
     model = mp.MultiPhiModel(structure, contacts, modes="all")
     motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
     exact = ExactMotion(motion, motion.levels, "body 'beam'", 0.0)
-    exact.hold(held(model, structure.row(at), math.nan), None)
+    exact.set_forces(held(model, structure.row(at), math.nan), None)
     with pytest.raises(mp.MultiPhiError, match=r"body 'beam': at t = 0\.5 s: the motion is not finite"):
         exact.advance(motion.static_state, 0.5, T_END)
 
@@ -195,7 +195,7 @@ def test_plain_functions_do_the_same(monkeypatch):
             monkeypatch.setattr(exact_motion, "carry", advance)
         motion = Run(model, 2.0, None, np.full(structure.n, -1.0)).begun()
         exact = ExactMotion(motion, motion.levels, "body", 0.0)
-        exact.hold(held(model, structure.row(at), force), None)
+        exact.set_forces(held(model, structure.row(at), force), None)
         found.append((exact, exact.advance(motion.static_state, 0.0, 2.0).state))
     (one, ours), (other, theirs) = found
     assert [event.time for event in one.events] == pytest.approx([event.time for event in other.events])

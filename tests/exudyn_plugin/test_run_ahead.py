@@ -135,13 +135,13 @@ def test_without_the_compiled_loop_it_is_the_same(kind, monkeypatch):
 
 
 def test_it_is_asked_at_events_only(monkeypatch):
-    asked, arrive = [], RunAhead.arrive
+    asked, arrive = [], RunAhead.after_step
 
     def counted(self, mbs, t, index):
         asked.append(t)
         arrive(self, mbs, t, index)
 
-    monkeypatch.setattr(RunAhead, "arrive", counted)
+    monkeypatch.setattr(RunAhead, "after_step", counted)
     found = System(model_of(50.0), matchedStepSize=STEP).solve()
     ends = {math.ceil(event.time / STEP) for event in found.events}
     assert {round(t / STEP) for t in asked} == ends | {500}
@@ -220,7 +220,7 @@ def test_a_run_in_parts_is_the_run(kind, modes):
         part = system.solve(start + 0.1, start=start, updateInitialValues=True)
         events += part.events
         last.append(part.points["m1"][-1])
-        phases.update(system.body.coordinates.stored()[1])
+        phases.update(system.body.coordinates.read_level_data()[1])
     assert same_events(events, whole.events)
     assert modes == "all" or phases > {Phase.ARMED}
     assert np.allclose(last, whole.points["m1"][10::10], rtol=0, atol=1e-9)

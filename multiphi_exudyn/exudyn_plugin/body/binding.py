@@ -11,9 +11,9 @@ __all__ = ["bind"]
 
 
 def bind(function: Callable[..., Any]) -> None:
-    """Make ``function(mbs, ...)`` a method of ``mbs``; a name that Exudyn has itself is left alone.
+    """Make ``function(mbs, ...)`` a method of ``mbs``, unless Exudyn has a method of this name itself.
 
-    Exudyn's registry is used where it exists; older versions take a plain class attribute.
+    Exudyn's registry is used if it exists, else a plain class attribute.
     """
     name = function.__name__
     if hasattr(exu.MainSystem, name):

@@ -2,17 +2,18 @@
 
     M q'' + D q' + K q = drive + (loads and connectors of the system),   q = eta of the present level
 
-NodeGenericODE2 holds q, ObjectGenericODE2 the matrices of the level, NodeGenericData the level: the states of all
-elements, phases of their exits, and the places that links hold (level_data.py).
+NodeGenericODE2 has q, ObjectGenericODE2 the matrices of the level, and NodeGenericData the level itself: the states of
+all elements, the phases of their exits, and the stick positions (level_data.py).
 
-A body on which nothing acts but its own loads follows a motion that is known beforehand (run_ahead.py): at the ends of
-steps with events its coordinates, matrices and level are those of ``simulate``. In between Exudyn's steps are of second
-order, and exact if matched to the step (stepped_level.py). Of a body whose loads vary every step ends exactly.
+A body on which nothing acts but its own loads follows a motion that is computed in advance (run_ahead.py): at the ends
+of steps with events its coordinates, matrices and level are those of ``simulate``. Between them Exudyn's steps are of
+second order, or exact if the modes are matched to the step (stepped_level.py). With varying loads every step ends
+exactly.
 
-Beside others every step is looked at, and done again exactly where a contact may have asked to change
-(step_by_step.py). Halving the step divides the error by four.
+A body beside others is tested after every step, and the step is computed again exactly where an event may have occurred
+in it (step_by_step.py). Its error is of second order in the step size.
 
-A load or connector at coordinate k of the node acts on mode k of whichever level holds.
+A load or connector at coordinate k of the node acts on mode k of the present level.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ from multiphi_exudyn.exudyn_plugin.body.run_ahead import RunAhead
 from multiphi_exudyn.exudyn_plugin.body.run_checks import check_integration, check_matched, check_start
 from multiphi_exudyn.exudyn_plugin.body.run_record import RunRecord
 from multiphi_exudyn.exudyn_plugin.body.start_state import start_state
-from multiphi_exudyn.exudyn_plugin.body.step_by_step import StepByStep
-from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of, nothing_acts_on, running_solver
+from multiphi_exudyn.exudyn_plugin.body.step_by_step import StepwiseRun
+from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of, is_isolated, running_solver
 from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import ExactMotion
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
@@ -46,42 +47,42 @@ __all__ = ["MultiPhiBody"]
 
 
 class MultiPhiBody:
-    """One Multi-Phi body of an Exudyn system: its items, its present state, and what happened to it.
+    """One Multi-Phi body of an Exudyn system: its items, its present state, and its events.
 
-    Made by ``CreateMultiPhiBody``, and found as ``mbs.variables["multiPhi"][name]``.
+    Created by ``CreateMultiPhiBody``, and available as ``mbs.variables["multiPhi"][name]``.
 
     Parameters
     ----------
     name : str
-        Of the body.
+        Name of the body.
     motion : Motion
-        Of the model, at its start.
+        Motion of the model, at its start.
     loads : sequence of loads
-        Its own, as of ``simulate``.
+        Loads of the body, as of ``simulate``.
     end : float
-        Of the run [s] that they are prepared for.
+        End of the run [s] that the loads are prepared for.
     matched_step : float or None
-        Step [s] that its modes are matched to.
-    outside : tuple of str, default ()
-        Warnings of what the base of a large structure leaves out.
+        Step size [s] that the modes are matched to.
+    base_warnings : tuple of str, default ()
+        Warnings about motions that the modal base of a large structure does not contain.
 
     Attributes
     ----------
     model : MultiPhiModel
-        What it moves by.
+        The reduced model.
     items : dict
-        Typed indices of its items in the system.
+        Typed indices of the body's items in the system.
     coordinates : Coordinates
-        Its part of the system's coordinates.
-    own : OwnLoads
-        Its loads in the present run.
+        The body's part of the system's coordinates.
+    own_loads : OwnLoads
+        The body's loads in the present run.
     start : tuple of array
-        Initial coordinates and velocities (s,) of its node.
+        Initial coordinates and velocities (s,) of the node.
 
     Raises
     ------
     MultiPhiValueError
-        For loads at points or contacts that there are not.
+        For loads at points or contacts that do not exist.
 
     Examples
     --------
@@ -117,114 +118,114 @@ class MultiPhiBody:
         loads: Sequence[Load],
         end: float,
         matched_step: float | None,
-        outside: tuple[str, ...] = (),
+        base_warnings: tuple[str, ...] = (),
     ) -> None:
         self.name = name
         self.model = motion.model
         self.items: dict[str, Any] = {}
         self.matched_step = matched_step
         self._time = math.nan
-        self._motion, self._loads, self._outside = motion, tuple(loads), outside
+        self._motion, self._loads, self._base_warnings = motion, tuple(loads), base_warnings
         self._size = self.model.level_at(()).modes
-        self.own = OwnLoads(self.model, loads, self._size, 0.0, end)
+        self.own_loads = OwnLoads(self.model, loads, self._size, 0.0, end)
         self._state = motion.static_state
-        most = self.model.most_levels
-        self._stepped_levels: BoundedCache[tuple[int, ...], SteppedLevel] = BoundedCache(most)
+        max_levels = self.model.most_levels
+        self._stepped_levels: BoundedCache[tuple[int, ...], SteppedLevel] = BoundedCache(max_levels)
         self._run_ahead: RunAhead | None = None
-        self._run_beside: StepByStep | None = None
+        self._stepwise_run: StepwiseRun | None = None
         self._record = RunRecord(self._state, motion.start_loss)
         stepped, state = self.stepped_level(self._state.states), self._state
         layout, matched = LevelData(self.model), matched_step is not None
-        self.coordinates = Coordinates(self.items, stepped, state.held, layout, most, matched)
-        q, q_t, _ = stepped.state(state.displacement, state.velocity, np.zeros(self._size))
+        self.coordinates = Coordinates(self.items, stepped, state.held, layout, max_levels, matched)
+        q, q_t, _ = stepped.solver_state(state.displacement, state.velocity, np.zeros(self._size))
         self.start = q, q_t
-        self._given_events = tuple(motion.events)
-        self._events = list(self._given_events)
+        self._start_events = tuple(motion.events)
+        self._events = list(self._start_events)
 
     @property
     def state(self) -> State:
-        """Level, modal displacement and velocity, phases; the last two after an event or at the start of a run."""
-        return self._state if self._run_beside is None else self._run_beside.state
+        """Level, modal displacement and velocity, and phases, after the last event or at the start of a run."""
+        return self._state if self._stepwise_run is None else self._stepwise_run.state
 
     @property
     def events(self) -> list[Event]:
-        """Closings and openings with their exact times."""
-        run = self._run_ahead or self._run_beside
+        """Events of the last run, with their exact times."""
+        run = self._run_ahead or self._stepwise_run
         return [*self._events, *(() if run is None else run.events)]
 
     @property
     def time(self) -> float:
-        """Of the last step [s] that is done."""
-        return self._time if self._stepping is None else self._stepping.time
+        """End of the last finished step [s]."""
+        return self._time if self._run_in_progress is None else self._run_in_progress.time
 
     @property
-    def _stepping(self) -> StepByStep | None:
-        """The run beside others that is under way."""
-        return self._run_beside if self._run_beside is not None and self._run_beside.running else None
+    def _run_in_progress(self) -> StepwiseRun | None:
+        """The step-by-step run, if one is in progress."""
+        return self._stepwise_run if self._stepwise_run is not None and self._stepwise_run.running else None
 
     @property
     def next_time(self) -> float:
-        """When [s] it has something to do next, infinite where its ``clear`` says, -inf before a run."""
+        """Time [s] of the next action, infinite where ``is_step_clear`` decides, -inf before a run."""
         ahead = self._run_ahead
         if ahead is not None and ahead.running:
             return ahead.next_time
-        return -math.inf if self._stepping is None else math.inf
+        return -math.inf if self._run_in_progress is None else math.inf
 
     @property
-    def clear(self) -> Callable[[float], int] | None:
-        """Says at the end of every step whether there is nothing to do, None where the time says it."""
-        return None if self._stepping is None else self._stepping.clear
+    def is_step_clear(self) -> Callable[[float], int] | None:
+        """Function of the end of a step [s], nonzero if the body needs no action; None where ``next_time`` decides."""
+        return None if self._run_in_progress is None else self._run_in_progress.is_step_clear
 
     @property
     def varies(self) -> bool:
-        """Whether its loads vary in time."""
-        return self.own.varies
+        """Whether the body's loads vary in time."""
+        return self.own_loads.varies
 
     @property
     def rigid(self) -> bool:
-        """Whether it has rigid contacts."""
+        """Whether the body has rigid contacts."""
         return self.coordinates.rigid
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to distrust in the last run, before any in the start, and what to do about it, a sentence each."""
-        truncated = 0.0 if self._run_ahead is None else self._run_ahead.recorded()
-        lost = total_loss(() if self._run_beside is None else self._run_beside.events)
+        """Warnings about the accuracy of the last run, or of the start before any run, with advice, a sentence each."""
+        truncated = 0.0 if self._run_ahead is None else self._run_ahead.update_record()
+        loss = total_loss(() if self._stepwise_run is None else self._stepwise_run.events)
         interface = self.coordinates.interface
-        turned = () if interface is None else interface.warnings
-        summary = self._record.of(total_loss(self._events) + lost, truncated)
-        return (*warnings_of_body(self.model, summary), *self._outside, *turned)
+        rotations = () if interface is None else interface.warnings
+        summary = self._record.summary(total_loss(self._events) + loss, truncated)
+        return (*warnings_of_body(self.model, summary), *self._base_warnings, *rotations)
 
     def stepped_level(self, states: Sequence[int]) -> SteppedLevel:
-        """The level of elements in these states as the solver has it."""
-        known = tuple(states)
-        return self._stepped_levels.get_or_build(known, lambda: self.own.stepped(known, self.matched_step))
+        """The solver's level in which the elements are in these states."""
+        key = tuple(states)
+        return self._stepped_levels.get_or_build(key, lambda: self.own_loads.stepped_level(key, self.matched_step))
 
     def force_vector(self, stepped: SteppedLevel) -> np.ndarray:
-        """Constant force (s,) of the object in a level, at the present time."""
-        return stepped.drive + self.own.force_at(stepped.states, 0.0 if math.isnan(self.time) else self.time)
+        """Force vector (s,) of the object in a level, at the present time."""
+        return stepped.drive + self.own_loads.force_at(stepped.states, 0.0 if math.isnan(self.time) else self.time)
 
-    def own_force(self, states: tuple[int, ...], time: float) -> np.ndarray:
-        """(p, f) of its own varying loads at the end of a step."""
-        force = np.zeros(self._size + self.coordinates.points)
+    def varying_load_force(self, states: tuple[int, ...], time: float) -> np.ndarray:
+        """Force (p, f) of the body's own varying loads at the end of a step [s], in a level."""
+        force = np.zeros(self._size + self.coordinates.point_count)
         if self.varies:
-            force[: self._size] = self.own.force_at(states, time)
+            force[: self._size] = self.own_loads.force_at(states, time)
         return force
 
     # ------------------------------------------------------------------ a step
 
     def before_step(self, mbs: Any, t: float) -> None:
-        """Called by Exudyn before a step that ends at t: beside others, the force of own loads that will then act."""
+        """Set the force of varying loads at t [s] before a step that ends there, in a step-by-step run."""
         if not self.varies or self._run_ahead is not None:
             return
-        if self._stepping is not None:
-            self._stepping.tell(t)
+        if self._run_in_progress is not None:
+            self._run_in_progress.announce_step_end(t)
         stepped = self.coordinates.stepped
-        force = stepped.drive + self.own.force_at(stepped.states, t)
+        force = stepped.drive + self.own_loads.force_at(stepped.states, t)
         mbs.SetObjectParameter(self.items["oGenericODE2"], "forceVector", force)
 
     def after_step(self, mbs: Any, t: float) -> None:
-        """Called by Exudyn when a step is done in which something may be to do, and at the start."""
+        """Handle the end of a step at t [s] in which an action may be needed, and the start of a run."""
         ahead = self._run_ahead
         if ahead is not None and ahead.running and ahead.time < t:
             if t < ahead.next_time:
@@ -232,14 +233,14 @@ class MultiPhiBody:
             index = mbs.sys["dynamicSolver"].it.currentStepIndex
             if index > ahead.index:
                 self._time = t
-                ahead.arrive(mbs, t, index)
+                ahead.after_step(mbs, t, index)
                 return
-        if (self._stepping is not None and self._stepping.ends(t)) or self._is_step(mbs, t):
-            assert self._stepping is not None
-            self._stepping.check(mbs, t)
+        if (self._run_in_progress is not None and self._run_in_progress.is_step_end(t)) or self._is_new_step(mbs, t):
+            assert self._run_in_progress is not None
+            self._run_in_progress.check(mbs, t)
 
-    def _is_step(self, mbs: Any, t: float) -> bool:
-        """Whether t ends a step, and not the start of a run or a static solution; takes the step size."""
+    def _is_new_step(self, mbs: Any, t: float) -> bool:
+        """Whether a new step of another size ends at t [s], which is then taken; begins runs and static solutions."""
         solver = running_solver(mbs, t)
         if solver is None:
             self._begin_static(mbs)
@@ -247,64 +248,66 @@ class MultiPhiBody:
         if solver.it.currentStepIndex == 0:
             self._begin(mbs, t)
             return False
-        if self._stepping is None or not t > self.time:
-            return False  # called twice
+        if self._run_in_progress is None or not t > self.time:
+            return False  # called again for the same step
         check_matched(self, t - self.time)
-        self._stepping.follow(t - self.time)
+        self._run_in_progress.change_step_size(t - self.time)
         return True
 
-    def look_again(self) -> None:
-        """Take the present state as the start of the next step: another body's event may have moved this one."""
-        if self._stepping is not None:
-            self._stepping.look_again()
+    def restart_step(self) -> None:
+        """Take the present state as the start of the next step, as another body's event may have changed it."""
+        if self._run_in_progress is not None:
+            self._run_in_progress.restart_step()
 
     # ------------------------------------------------------------------ start of a run
 
     def _begin_static(self, mbs: Any) -> None:
-        """Give a static solution the level that the system has at its start, whatever the last run ended in."""
+        """Set the level in the data node for a static solution, whatever the last run ended in."""
         self.coordinates.attach(mbs)
-        for run in (self._run_ahead, self._run_beside):
+        for run in (self._run_ahead, self._stepwise_run):
             if run is not None:
                 run.running = False
-        states, _, self.coordinates.held = self.coordinates.stored()
+        states, _, self.coordinates.held = self.coordinates.read_level_data()
         stepped = self.stepped_level(states)
-        self.coordinates.load(mbs, stepped, self.force_vector(stepped))
+        self.coordinates.set_level(mbs, stepped, self.force_vector(stepped))
 
     def _begin(self, mbs: Any, t: float) -> None:
-        """Take state and level from the system as it stands at the start of a run."""
+        """Begin a run: take state and level from the system."""
         check_integration(self, mbs.sys["simulationSettings"], trapezoidal=False)
-        here, step = self.coordinates, float(mbs.sys["dynamicSolver"].it.currentStepSize)
+        coordinates, step = self.coordinates, float(mbs.sys["dynamicSolver"].it.currentStepSize)
         check_matched(self, step)
-        here.attach(mbs)
-        nodes = self.items["nGenericODE2"], self.items["oGenericODE2"]
-        alone = here.interface is None and nothing_acts_on(mbs, *nodes)
-        if here.rigid and not alone:
-            check_start(mbs, self, self.start, sum(event.loss.impact for event in self._given_events))
-        self._run_ahead, self._run_beside, self._time = None, None, t
+        coordinates.attach(mbs)
+        items = self.items["nGenericODE2"], self.items["oGenericODE2"]
+        isolated = coordinates.interface is None and is_isolated(mbs, *items)
+        if coordinates.rigid and not isolated:
+            check_start(mbs, self, self.start, sum(event.loss.impact for event in self._start_events))
+        self._run_ahead, self._stepwise_run, self._time = None, None, t
         end = float(mbs.sys["simulationSettings"].timeIntegration.endTime)
         if self.varies:
-            self.own = OwnLoads(self.model, self._loads, self._size, t, end)
-        fresh = all(np.array_equal(view, given) for view, given in zip(here.views[:2], self.start, strict=True))
-        self._events = [replace(event, time=t) for event in self._given_events] if fresh else []
-        self._state = start_state(self, self.own, mbs, t, step, alone, fresh)
-        self._record = RunRecord(self._state, self._motion.start_loss if fresh else Loss())
-        if alone:
-            self._set_out(mbs, step, end)
+            self.own_loads = OwnLoads(self.model, self._loads, self._size, t, end)
+        as_created = all(
+            np.array_equal(view, start) for view, start in zip(coordinates.views[:2], self.start, strict=True)
+        )
+        self._events = [replace(event, time=t) for event in self._start_events] if as_created else []
+        self._state = start_state(self, self.own_loads, mbs, t, step, isolated, as_created)
+        self._record = RunRecord(self._state, self._motion.start_loss if as_created else Loss())
+        if isolated:
+            self._begin_run_ahead(mbs, step, end)
         else:
-            self._set_out_beside(step)
-        bodies_of(mbs).end = end - SAME_STEP * step
+            self._begin_stepwise_run(step)
+        bodies_of(mbs).end_time = end - SAME_STEP * step
 
-    def _set_out_beside(self, step: float) -> None:
-        """Look at every step of this length [s] from now on."""
-        self._motion.levels = self.own.loaded
-        exact = ExactMotion(self._motion, self.own.levels, f"body {self.name!r}", self._time)
-        self._run_beside = StepByStep(self, self.own, exact, self._record, self._time, step, self._state)
+    def _begin_stepwise_run(self, step: float) -> None:
+        """Begin a step-by-step run with steps of this length [s]."""
+        self._motion.levels = self.own_loads.loaded_levels
+        exact = ExactMotion(self._motion, self.own_loads.static_levels, f"body {self.name!r}", self._time)
+        self._stepwise_run = StepwiseRun(self, self.own_loads, exact, self._record, self._time, step, self._state)
 
-    def _set_out(self, mbs: Any, step: float, end: float) -> None:
-        """Compute the motion ahead, from the present state and time on."""
-        alone = motion_of(self.own.loaded, self._motion.start)
-        alone.sums_works = False  # nobody asks a body for them
-        motion, here = KnownMotion(alone, self._state, self.time), self.coordinates
-        here.enter(mbs, here.stepped, here.stepped.drive)
+    def _begin_run_ahead(self, mbs: Any, step: float, end: float) -> None:
+        """Begin a run along the exact motion from the present state and time on."""
+        exact = motion_of(self.own_loads.loaded_levels, self._motion.start)
+        exact.sums_works = False  # a body does not report works
+        motion, coordinates = KnownMotion(exact, self._state, self.time), self.coordinates
+        coordinates.set_level_in_run(mbs, coordinates.stepped, coordinates.stepped.drive)
         self._run_ahead = RunAhead(self, motion, self._record, self.time, step, end)
         self._run_ahead.begin(mbs)

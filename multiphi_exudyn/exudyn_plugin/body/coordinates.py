@@ -1,9 +1,9 @@
-"""Coordinates: a body's part of an Exudyn system: its q, q', q'', its matrices, and the level in its data node.
+"""Coordinates: the part of an Exudyn system that belongs to a body: q, q', q'', matrices, and its data node.
 
     M q'' + D q' + K q = drive + p
 
-The level whose matrices the system has is ``stepped``; p (s,) is what the body's own varying loads add, and loads and
-connectors of the system on the body's node and, as forces f (m,) on points, on its interface.
+The system has the matrices of the level ``stepped``. p (s,) is the modal force of the body's own varying loads and of
+the system's loads and connectors: those on the body's node, and those on its interface as forces f (m,) on points.
 """
 
 from __future__ import annotations
@@ -24,27 +24,28 @@ from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 
 __all__ = ["SAME_STEP", "Coordinates", "matrices"]
 
-ONE = np.ones(1)  # the entry of x that its constants belong to
-SAME_STEP = 1e-6  # relative change of the step size that is rounding of the times
+ONE = np.ones(1)  # the entry 1 of x = (q, q', q'', 1, f)
+SAME_STEP = 1e-6  # relative: a smaller change of the step size is rounding of the times
 
 
 @dataclass(frozen=True)
-class Felt:
-    """acting: (p, f) (s + m,). whole: of which forces or accelerations (n,) of the whole system it was found."""
+class ExternalForces:
+    """External forces (p, f) (s + m,) on a body, and the forces or accelerations (n,) of the system they come from."""
 
-    acting: np.ndarray
-    whole: np.ndarray
+    forces: np.ndarray
+    system_values: np.ndarray
 
 
 class Coordinates:
-    """Coordinates (s,) of one body. items: its typed indices. stepped: see the module's docstring.
+    """Coordinates (s,) of one body in an Exudyn system.
 
-    interface: its interface coordinates or None. surroundings: the system around them, views: q, q', q'' in the
-    system's current state, multipliers: all those of the system, during a run. held: places (h,) that links hold, as
-    the interface has them. layout: of the data node. most: levels of which Exudyn's own matrices are kept. matched:
-    whether M differs among levels. rigid: whether links of the body become rigid. slips: whether links have held
-    places. foreseen: whether what happens at an event depends on the forces that follow it, as reactions do, and
-    accelerations that say which way something slips.
+    items: typed indices of the body's items. stepped: level whose matrices the system has. held: stick positions (h,)
+    [m] in the interface. layout: of the data node. interface: its interface coordinates, or None.
+    max_levels: number of levels of which Exudyn's own matrices are kept. matched: whether M differs among levels.
+    During a run, system: the system around the body, if it has an interface; views: of q, q', q'' in the system's
+    current state; multipliers: view of all multipliers.
+    rigid: whether the body has rigid links. has_friction: whether links have stick positions. depends_on_later_forces:
+    whether an event depends on the forces right after it, as reactions do, and the direction in which friction slips.
     """
 
     def __init__(
@@ -53,55 +54,55 @@ class Coordinates:
         stepped: SteppedLevel,
         held: np.ndarray,
         layout: LevelData,
-        most: int,
+        max_levels: int,
         matched: bool,
     ) -> None:
         self.items = items
         self.stepped, self.held, self.layout = stepped, held, layout
         self.rigid = bool(np.any(np.isinf(stepped.loaded.level.base.stiffnesses)))
-        self.slips = layout.places > 0
-        self.foreseen = self.rigid or self.slips
+        self.has_friction = layout.held_count > 0
+        self.depends_on_later_forces = self.rigid or self.has_friction
         self._matched = matched
-        self._prepared = BoundedCache[tuple[int, ...], dict[str, Any]](most)
+        self._prepared = BoundedCache[tuple[int, ...], dict[str, Any]](max_levels)
         self.interface: Interface | None = None
-        self.surroundings: SystemMatrices | None = None
+        self.system: SystemMatrices | None = None
         self.views: tuple[np.ndarray, ...] = ()
         self.multipliers = np.zeros(0)
 
     @property
-    def points(self) -> int:
+    def point_count(self) -> int:
         """m, the number of interface coordinates."""
         return 0 if self.interface is None else self.interface.count
 
     def attach(self, mbs: Any) -> None:
-        """Take the views of the system's current state; they hold for one run."""
+        """Take the views of the system's current state; they are valid for one run."""
         state, size = mbs.systemData.GetSystemStateDict(reference=True), self.stepped.size
         first = mbs.GetNodeODE2Index(self.items["nGenericODE2"])
-        self._own, self._count = slice(first, first + size), len(state["ODE2Coords"])
-        self.views = tuple(state[key][self._own] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
+        self._indices, self._count = slice(first, first + size), len(state["ODE2Coords"])
+        self.views = tuple(state[key][self._indices] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
         self.multipliers = state["AECoords"]
         if self.interface is not None:
             self.interface.attach(state)
-            self.surroundings = self.beside(mbs)
+            self.system = self.system_around(mbs)
         if "nGenericData" in self.items:
-            places = mbs.systemData.GetNodeLTGData(self.items["nGenericData"])
-            self._data = state["dataCoords"][places[0] : places[0] + len(places)]
+            indices = mbs.systemData.GetNodeLTGData(self.items["nGenericData"])
+            self._data = state["dataCoords"][indices[0] : indices[0] + len(indices)]
 
-    def beside(self, mbs: Any) -> SystemMatrices:
+    def system_around(self, mbs: Any) -> SystemMatrices:
         """The system around the body."""
-        own, interface = range(self._own.start, self._own.stop), self.interface
-        return SystemMatrices(mbs, own, interface.places if interface else (), interface.ties if interface else ())
+        body, interface = range(self._indices.start, self._indices.stop), self.interface
+        return SystemMatrices(mbs, body, interface.indices if interface else (), interface.ties if interface else ())
 
-    def read(self) -> np.ndarray:
+    def copy_state(self) -> np.ndarray:
         """A copy x = (q, q', q'', 1, f) of the present state."""
         if self.interface is None:
             return np.concatenate([*self.views, ONE])
         return np.concatenate([*self.views, ONE, self.interface.forces])
 
-    def force(self, x: np.ndarray) -> np.ndarray:
-        """(p, f) of x."""
-        known = 3 * self.stepped.size + 1
-        return np.concatenate([self.stepped.outside.dot(x[:known]), x[known:]])
+    def external_force(self, x: np.ndarray) -> np.ndarray:
+        """External forces (p, f) of a state x, by the equation of motion."""
+        count = 3 * self.stepped.size + 1
+        return np.concatenate([self.stepped.external_force_matrix.dot(x[:count]), x[count:]])
 
     def split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q, q', q'' of x."""
@@ -109,14 +110,14 @@ class Coordinates:
         return x[:s], x[s : 2 * s], x[2 * s : 3 * s]
 
     def write(self, stepped: SteppedLevel, held: np.ndarray, values: Iterable[np.ndarray]) -> None:
-        """Write q, q', q'' (s,) in a level with places that links hold (h,), and what follows on the interface."""
+        """Write q, q', q'' (s,) of a level with stick positions (h,) [m], and the interface coordinates they give."""
         q, q_t, q_tt = self.views
         q[:], q_t[:], q_tt[:] = values
         if self.interface is not None:
             self.interface.write(stepped, held, self.views)
 
-    def load(self, mbs: Any, stepped: SteppedLevel, force: np.ndarray) -> None:
-        """Give the system the matrices of a level, and the force (s,) of the body's own that now acts in it."""
+    def set_level(self, mbs: Any, stepped: SteppedLevel, force: np.ndarray) -> None:
+        """Give the system the matrices of a level and the force vector (s,) of the body."""
         self.stepped = stepped
         links = stepped.loaded.level.indices
         prepared = self._prepared.get_or_build(links, lambda: _containers(stepped))
@@ -124,73 +125,74 @@ class Coordinates:
             mbs.SetObjectParameter(self.items["oGenericODE2"], parameter, value)
         mbs.SetObjectParameter(self.items["oGenericODE2"], "forceVector", force)
         if self.interface is not None:
-            self.interface.load(stepped, self.held)
+            self.interface.set_level(stepped, self.held)
 
-    def enter(self, mbs: Any, stepped: SteppedLevel, force: np.ndarray) -> None:
-        """``load`` within a run of the dynamic solver."""
-        self.load(mbs, stepped, force)
-        if self._matched:  # a solver may take the mass matrix for constant and keep it
+    def set_level_in_run(self, mbs: Any, stepped: SteppedLevel, force: np.ndarray) -> None:
+        """``set_level`` within a run of the dynamic solver."""
+        self.set_level(mbs, stepped, force)
+        if self._matched:  # a solver may keep a mass matrix that it takes for constant
             mbs.sys["dynamicSolver"].ComputeMassMatrix(mbs)
         mbs.solverSignalJacobianUpdate = True
 
-    def enter_with(self, mbs: Any, stepped: SteppedLevel, held: np.ndarray, force: np.ndarray) -> None:
-        """``enter`` a level with places that links hold (h,), where either is another than now."""
+    def set_level_if_changed(self, mbs: Any, stepped: SteppedLevel, held: np.ndarray, force: np.ndarray) -> None:
+        """Set a level with stick positions (h,) [m] within a run, if either differs from the present one."""
         if stepped.states != self.stepped.states or np.any(held != self.held):
             self.held = held
-            self.enter(mbs, stepped, force)
+            self.set_level_in_run(mbs, stepped, force)
 
-    def applied(self, mbs: Any) -> np.ndarray:
-        """p (s,) in the present state of the system, of a body without interface."""
-        return self.felt(mbs, self.stepped).acting
+    def external_modal_force(self, mbs: Any) -> np.ndarray:
+        """Modal force p (s,) in the present state of the system, for a body without interface."""
+        return self.external_forces(mbs, self.stepped).forces
 
-    def felt(self, mbs: Any, shown: SteppedLevel) -> Felt:
-        """(p, f) of loads and connectors in the present state of the system, with coordinates of the level ``shown``.
+    def external_forces(self, mbs: Any, written: SteppedLevel) -> ExternalForces:
+        """Forces (p, f) of loads and connectors in the present state of the system, and the forces (n,) of the system.
 
-        Beside it the forces (n,) on the whole system. The level need not be that of the system's matrices.
+        written: the level whose coordinates are in the system; its matrices may be those of another one.
         """
         solver = mbs.sys["dynamicSolver"]
         solver.ComputeODE2RHS(mbs)
-        whole = np.array(solver.GetSystemResidual())[: self._count]
-        modal = whole[self._own] + self.stepped.resisting(*self.views[:2])
+        system_forces = np.array(solver.GetSystemResidual())[: self._count]
+        modal = system_forces[self._indices] + self.stepped.internal_force(*self.views[:2])
         if self.interface is None:
-            return Felt(modal, whole)
-        points = whole[self.interface.places]
-        return Felt(np.concatenate([modal + points @ self.interface.of(shown).rows, points]), whole)
+            return ExternalForces(modal, system_forces)
+        points = system_forces[self.interface.indices]
+        rows = self.interface.map_in(written).rows
+        return ExternalForces(np.concatenate([modal + points @ rows, points]), system_forces)
 
-    def seen(self, accelerations: np.ndarray) -> Felt:
-        """(p, f) that belong to accelerations (n,) of the whole system in its present state, and to its multipliers."""
+    def forces_from_accelerations(self, accelerations: np.ndarray) -> ExternalForces:
+        """External forces (p, f) in the present state, for accelerations (n,) of the system and its multipliers."""
         assert self.interface is not None
         q, q_t, _ = self.views
-        x = np.concatenate([q, q_t, accelerations[self._own], ONE, self.interface.forces])
-        return Felt(self.force(x), accelerations)
+        x = np.concatenate([q, q_t, accelerations[self._indices], ONE, self.interface.forces])
+        return ExternalForces(self.external_force(x), accelerations)
 
-    def put_forces(self, forces: np.ndarray) -> None:
-        """Make f (m,) what the ties hold."""
+    def set_tie_forces(self, forces: np.ndarray) -> None:
+        """Write f (m,) as the multipliers of the ties."""
         assert self.interface is not None
         self.multipliers[self.interface.multipliers] = forces
 
-    def carried(self, force: np.ndarray, given: SteppedLevel, wanted: SteppedLevel) -> np.ndarray:
-        """(p, f) of one level in another: what acts on points stays there."""
-        return force if self.interface is None else self.interface.carried(force, given, wanted)
+    def transform_force(self, force: np.ndarray, source: SteppedLevel, target: SteppedLevel) -> np.ndarray:
+        """Forces (p, f) of one level in another: forces on points stay the same."""
+        return force if self.interface is None else self.interface.transform_force(force, source, target)
 
-    def direct(self, stepped: SteppedLevel) -> np.ndarray:
-        """L (k, m) in a level: L f is what the closed contacts carry of f beside its modes' share."""
+    def direct_reactions(self, stepped: SteppedLevel) -> np.ndarray:
+        """L (k, m) in a level: L f [N] are reactions of the closed contacts to f that its modes do not contain."""
         if self.interface is None:
             return np.zeros((len(stepped.loaded.level.indices), 0))
-        return self.interface.of(stepped).direct
+        return self.interface.map_in(stepped).direct_reactions
 
-    def store(self, data: np.ndarray) -> None:
-        """Write the level data of a state into the data node."""
+    def write_level_data(self, data: np.ndarray) -> None:
+        """Write level data (width,) into the data node."""
         if "nGenericData" in self.items:
             self._data[:] = data
 
-    def stored(self) -> tuple[tuple[int, ...], tuple[Phase, ...], np.ndarray]:
-        """States, phases and held places from the data node."""
+    def read_level_data(self) -> tuple[tuple[int, ...], tuple[Phase, ...], np.ndarray]:
+        """States, phases and stick positions from the data node."""
         return self.layout.read(self._data if "nGenericData" in self.items else np.zeros(0))
 
 
 def matrices(stepped: SteppedLevel, force: np.ndarray) -> dict[str, np.ndarray]:
-    """Parameters of the ObjectGenericODE2."""
+    """Parameters of the ObjectGenericODE2 in a level."""
     return {
         "massMatrix": stepped.mass,
         "dampingMatrix": stepped.damping,
@@ -200,7 +202,7 @@ def matrices(stepped: SteppedLevel, force: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _containers(stepped: SteppedLevel) -> dict[str, Any]:
-    """Mass, damping and stiffness as Exudyn's own matrices, which it takes over without looking at every number."""
-    given = matrices(stepped, stepped.drive)
-    del given["forceVector"]
-    return {parameter: exu.MatrixContainer(value) for parameter, value in given.items()}
+    """Mass, damping and stiffness as Exudyn's own matrices, which are set without a conversion entry by entry."""
+    parameters = matrices(stepped, stepped.drive)
+    del parameters["forceVector"]
+    return {parameter: exu.MatrixContainer(value) for parameter, value in parameters.items()}

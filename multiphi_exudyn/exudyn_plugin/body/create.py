@@ -32,7 +32,7 @@ from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["CreateMultiPhiBody"]
 
-PROVISIONAL = 1.0  # s: end of the run that a start belongs to, until the solver tells its own
+PROVISIONAL = 1.0  # s: end of the run for which the loads are prepared, until the solver gives the real one
 
 
 def CreateMultiPhiBody(
@@ -55,8 +55,8 @@ def CreateMultiPhiBody(
 
     q are the modal coordinates eta of the present level.
 
-    A body on which nothing acts but its own loads follows the motion of ``simulate``; beside others its steps are of
-    second order, and its events are found inside them.
+    A body on which nothing acts but its own loads follows the motion of ``simulate``. A body beside others has steps of
+    second order, with events at their exact times inside the steps.
 
     Parameters
     ----------
@@ -65,49 +65,50 @@ def CreateMultiPhiBody(
     model : MultiPhiModel
         Structure, contacts and numbers of modes.
     name : str, default ""
-        Of the body, and of its items with a prefix; empty for "multiPhi0" and so on.
+        Name of the body, and with a prefix of its items; empty for "multiPhi0", "multiPhi1", ...
     displacement, velocity : array (n,), default None
         x [m, rad] and x' [m/s, rad/s] at the start, None for zero.
     loads : sequence of loads, default ()
-        As of ``simulate``. The base of a large structure is given what they and the ``interface`` act on.
+        As of ``simulate``. The modal base of a large structure includes the static responses to them and to forces on
+        the ``interface``.
     matchedStepSize : float, default None
-        The fixed step size [s] of the solver, to which modes are matched: the body alone is then exact at that step
-        with TrapezoidalIndex2, or GeneralizedAlpha of spectralRadius 1; velocities of the node are those of the matched
-        modes.
+        The fixed step size [s] of the solver, to which the modes are matched: without other forces the body is then
+        exact at that step with TrapezoidalIndex2, or GeneralizedAlpha of spectralRadius 1. Velocities of the node are
+        those of the matched modes.
     interface : iterable of str, or mapping of str to point, default ()
-        What connectors, loads and sensors of the system act on: names of points or {name: point or row}, one coordinate
-        each; or {name: PositionInterface or RigidInterface}, positions and frames to which markers of positions and of
-        rigid bodies attach. Needs TrapezoidalIndex2 and constant ``loads``. Where an ObjectContactCoordinate acts on
-        them, set ``timeIntegration.discontinuous.useRecommendedStepSize=False``: shorter steps are no gain, and with
-        matchedStepSize an error.
+        Points on which connectors, loads and sensors of the system act: names of points or {name: point or row}, one
+        coordinate each; or {name: PositionInterface or RigidInterface}, positions and frames to which markers of
+        positions and of rigid bodies attach. Needs TrapezoidalIndex2 and constant ``loads``. Where an
+        ObjectContactCoordinate acts on them, set ``timeIntegration.discontinuous.useRecommendedStepSize=False``: its
+        shorter steps gain nothing, and with matchedStepSize they are an error.
     show : bool, default True
         As in other Create functions.
     drawing : Drawing, default None
-        How the renderer shows the body; None for nothing.
+        Drawing of the body in the renderer, None for none.
     start : Trajectory or Equilibrium, default None
-        As of ``simulate``, instead of a displacement; the final state of a trajectory is handed on whole, and time
+        As of ``simulate``, instead of a displacement. The body takes the whole final state of a trajectory, and time
         begins anew.
     color : sequence of float, default (-1, -1, -1, -1)
-        Red, green, blue and opacity, as in other Create functions; negative for the usual.
+        Red, green, blue and opacity, as in other Create functions; negative for the default.
 
     Returns
     -------
     dict
-        Typed indices: nGenericODE2, oGenericODE2, nGenericData (not without contacts), sCoordinates, sCoordinates_t,
-        sCoordinates_tt and sLevel; with an interface nInterface {name: NodeIndex} and sInterface {name: SensorIndex},
-        the forces on its coordinates. ``body_histories(mbs, items)`` turns the sensors into displacements and forces;
-        ``mbs.variables["multiPhi"][name]`` has the ``events``, with times inside steps, and the ``warnings``, for each
-        of which a MultiPhiWarning is issued at the end of a run.
+        Typed indices: nGenericODE2, oGenericODE2, nGenericData and sLevel (both only with contacts), sCoordinates,
+        sCoordinates_t, sCoordinates_tt; with an interface nInterface {name: NodeIndex} and sInterface
+        {name: SensorIndex}, the forces on its coordinates. ``body_histories(mbs, items)`` computes displacements and
+        forces from the sensors. ``mbs.variables["multiPhi"][name]`` has the ``events``, with times inside steps, and
+        the ``warnings``; each warning is issued as a MultiPhiWarning at the end of a run.
 
     Raises
     ------
     MultiPhiTypeError
         For arguments of another kind.
     MultiPhiValueError
-        For a name that is taken, a model with a Tolerance, a step that is not > 0; beside an interface loads that vary,
-        moving counter-surfaces, and rigid contacts with friction; and what ``simulate`` refuses.
+        For a name that is in use, a model with a Tolerance, a step that is not > 0; with an interface for loads that
+        vary, moving counter-surfaces, and rigid contacts with friction; and for arguments that ``simulate`` refuses.
     NumericalFailure
-        For a start that cannot be carried through.
+        If the computation of the start fails.
 
     Examples
     --------
@@ -155,32 +156,34 @@ def CreateMultiPhiBody(
     model = holding(model, loads, start, rows)
     run = started(Run(model, PROVISIONAL, displacement, velocity, loads, start=start, rewound=True))
     body = MultiPhiBody(name, _motion(run), loads, PROVISIONAL, matchedStepSize, outside_of(run, model, rows))
-    moving = [link for link in model.links if link.velocity]
-    if nodes and moving:
-        name, speed = moving[0].name, moving[0].velocity
+    moving_surfaces = [link for link in model.links if link.velocity]
+    if nodes and moving_surfaces:
+        name, speed = moving_surfaces[0].name, moving_surfaces[0].velocity
         raise MultiPhiValueError(
             f"velocity of {name!r}: got {speed:g} m/s of the counter-surface in a body with an interface, need 0 m/s"
         )
-    rough = [c.name for c in model.contacts if isinstance(c, UnilateralContact) and c.rigid and c.friction]
-    if nodes and rough:
-        given = f"rigid contacts with friction ({', '.join(rough)}) in a body with an interface"
-        raise MultiPhiValueError(f"friction: got {given}, need a finite stiffness of these contacts")
+    rigid_with_friction = [
+        c.name for c in model.contacts if isinstance(c, UnilateralContact) and c.rigid and c.friction
+    ]
+    if nodes and rigid_with_friction:
+        received = f"rigid contacts with friction ({', '.join(rigid_with_friction)}) in a body with an interface"
+        raise MultiPhiValueError(f"friction: got {received}, need a finite stiffness of these contacts")
     if nodes and body.varies:
         varying = {type(load).__name__ for load in loads if not isinstance(load, (ConstantLoad, Gravity))}
         raise MultiPhiValueError(
             f"loads: got {', '.join(sorted(varying))} in a body with an interface, need constant loads (give a varying "
             "force as a load of the Exudyn system on an interface coordinate)"
         )
-    look = {"show": show, "color": list(color)}
-    body.items.update(_add_items(mbs, body, look, drawing))
+    visualization = {"show": show, "color": list(color)}
+    body.items.update(_add_items(mbs, body, visualization, drawing))
     if nodes:
-        _add_interface(mbs, body, nodes, look)
+        _add_interface(mbs, body, nodes, visualization)
     body.items.update(add_sensors(mbs, body))
     bodies.add(body)
     if model.contacts or nodes or matchedStepSize is not None or body.varies:
         bodies.install(mbs)
     if body.varies:
-        bodies.install_before(mbs)
+        bodies.install_pre_step(mbs)
     return dict(body.items)
 
 
@@ -194,14 +197,14 @@ def _check_step(step: float | None) -> None:
 
 
 def _motion(run: Run) -> Motion:
-    """A motion at its start."""
+    """The motion of a run, at its start."""
     motion = run.begun()
     if motion.message:
         raise NumericalFailure(motion.message)
     return motion
 
 
-def _add_items(mbs: Any, body: MultiPhiBody, look: dict[str, Any], drawing: Drawing | None) -> dict[str, Any]:
+def _add_items(mbs: Any, body: MultiPhiBody, visualization: dict[str, Any], drawing: Drawing | None) -> dict[str, Any]:
     stepped, (q, q_t) = body.stepped_level(body.state.states), body.start
     node = mbs.AddNode(
         NodeGenericODE2(
@@ -219,12 +222,13 @@ def _add_items(mbs: Any, body: MultiPhiBody, look: dict[str, Any], drawing: Draw
             nodeNumbers=[node],
             **matrices(stepped, body.force_vector(stepped)),
             visualization=VObjectGenericODE2(
-                **look, graphicsDataUserFunction=0 if drawing is None else graphics_of(body, drawing, look["color"])
+                **visualization,
+                graphicsDataUserFunction=0 if drawing is None else graphics_of(body, drawing, visualization["color"]),
             ),
         )
     )
     if body.model.contacts:
-        values = body.coordinates.layout.of(body.state)
+        values = body.coordinates.layout.from_state(body.state)
         items["nGenericData"] = mbs.AddNode(
             NodeGenericData(
                 name=f"Node:{body.name}.level", initialCoordinates=values, numberOfDataCoordinates=len(values)
@@ -233,8 +237,8 @@ def _add_items(mbs: Any, body: MultiPhiBody, look: dict[str, Any], drawing: Draw
     return items
 
 
-def _add_interface(mbs: Any, body: MultiPhiBody, nodes: Sequence[InterfaceNode], look: dict[str, Any]) -> None:
+def _add_interface(mbs: Any, body: MultiPhiBody, nodes: Sequence[InterfaceNode], visualization: dict[str, Any]) -> None:
     interface = body.coordinates.interface = Interface(mbs, body.name, nodes, body.model.most_levels)
     stepped = body.stepped_level(body.state.states)
-    interface.add(body.items["nGenericODE2"], stepped, body.state.held, *body.start, look)
+    interface.add(body.items["nGenericODE2"], stepped, body.state.held, *body.start, visualization)
     body.items["nInterface"], body.items["sInterface"] = interface.nodes, interface.sensors

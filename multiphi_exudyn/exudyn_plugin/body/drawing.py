@@ -4,9 +4,9 @@
 
 P (k, 3) positions [m]; w (k, n) rows of the deflections [m]; d direction; x (n,) the present displacement.
 
-Exudyn calls the function that is made here only while it redraws; a run that nobody looks at does none of this.
-Contacts whose direction is not that of one point (between two points, of a force law) have no block. A stop that
-moves is drawn where it is at rest.
+Exudyn calls the drawing function only when it redraws, so a run without renderer takes no time for it. Contacts whose
+direction is not that of one point (between two points, of a force law) have no block. A stop that moves is drawn where
+it is without its motion.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from exudyn import graphics
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
-from multiphi_exudyn.exudyn_plugin.body.rebuilt import rebuilt
+from multiphi_exudyn.exudyn_plugin.body.rebuilt import reconstruct
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real, real_array
 from multiphi_exudyn.mechanics.beam import Beam
@@ -31,7 +31,7 @@ from multiphi_exudyn.mechanics.planar_beam import beam_deflections
 
 __all__ = ["Drawing", "check_drawing", "graphics_of"]
 
-PARALLEL = 1e-9  # relative: a contact's direction is that of a point up to the rounding of its coefficients
+PARALLEL = 1e-9  # relative: rounding of the coefficients of a contact's direction
 SIDES = 12  # of a bar: looks round, costs little
 BLOCK = 4.0  # edge of a stop's block in radii of the bars
 BODY, OPEN, CLOSED = (0.0, 0.447, 0.698, 1.0), (0.6, 0.6, 0.6, 1.0), (0.835, 0.369, 0.0, 1.0)
@@ -39,12 +39,13 @@ BODY, OPEN, CLOSED = (0.0, 0.447, 0.698, 1.0), (0.6, 0.6, 0.6, 1.0), (0.835, 0.3
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """How a body looks in Exudyn's renderer: a line of thick bars, and a block for every stop.
+    """Drawing of a body in Exudyn's renderer: a line of thick bars, and a block for every stop.
 
         point j                       p_j = P_j + scale (w_j.x) d
         stop of contact i at point j  P_j - scale (gap_i / c) d,  where h_i = c w_j
 
-    Contacts whose direction is not that of one point have no block; a stop that moves is drawn where it is at rest.
+    Contacts whose direction is not that of one point have no block. A stop that moves is drawn where it is without its
+    motion.
 
     Parameters
     ----------
@@ -55,16 +56,16 @@ class Drawing:
     direction : array (3,)
         d of a positive deflection, a unit vector.
     scale : float, default 1.0
-        Of deflections and gaps in the picture, > 0.
+        Scale of deflections and gaps in the picture, > 0.
     radius : float, default 1e-3
-        Of the bars [m], > 0.
+        Radius of the bars [m], > 0.
 
     Raises
     ------
     MultiPhiTypeError
-        For what are no real numbers.
+        For values that are not real numbers.
     MultiPhiValueError
-        For other shapes, a direction that is no unit vector, and a scale or a radius that is not finite and > 0.
+        For other shapes, a direction that is not a unit vector, and a scale or a radius that is not finite and > 0.
 
     Examples
     --------
@@ -85,10 +86,10 @@ class Drawing:
     def __post_init__(self) -> None:
         for field, axes, columns in (("positions", 2, 3), ("rows", 2, None), ("direction", 1, 3)):
             needed = "(3,)" if axes == 1 else f"(k, {columns or 'n'})"
-            given = np.array(real_array(f"drawing {field}", getattr(self, field), f"an array {needed}"))
-            if given.ndim != axes or (columns and given.shape[-1] != columns):
-                raise MultiPhiValueError(f"drawing {field}: got shape {given.shape}, need {needed}")
-            object.__setattr__(self, field, given)
+            array = np.array(real_array(f"drawing {field}", getattr(self, field), f"an array {needed}"))
+            if array.ndim != axes or (columns and array.shape[-1] != columns):
+                raise MultiPhiValueError(f"drawing {field}: got shape {array.shape}, need {needed}")
+            object.__setattr__(self, field, array)
         if len(self.positions) != len(self.rows) or len(self.rows) < 2:
             received = f"drawing rows: got {len(self.rows)} rows for {len(self.positions)} positions"
             raise MultiPhiValueError(f"{received}, need one each, at least two")
@@ -108,13 +109,13 @@ class Drawing:
         Parameters
         ----------
         beam : Beam
-            Of the structure.
+            Beam of the structure.
         elements : int, default 57
             As of ``planar_beam``.
         scale : float, default 1.0
-            Of deflections and gaps in the picture.
+            Scale of deflections and gaps in the picture.
         radius : float, default 1e-3
-            Of the bars [m].
+            Radius of the bars [m].
         """
         x, rows = beam_deflections(beam, elements)
         zero = np.zeros_like(x)
@@ -125,19 +126,19 @@ class Drawing:
         return self.positions + self.scale * deflections[:, None] * self.direction
 
     def stop(self, direction: np.ndarray, gap: float) -> np.ndarray | None:
-        """Centre (3,) [m] of the block of a contact h.x + gap, None if no single point strikes it."""
+        """Centre (3,) [m] of the block of a contact h.x + gap, None if h is not the direction of one point."""
         along = np.linalg.norm(self.rows, axis=1) * np.linalg.norm(direction)
-        struck = np.flatnonzero((along > 0) & (np.abs(self.rows @ direction) >= (1 - PARALLEL) * along))
-        if not len(struck):
+        candidates = np.flatnonzero((along > 0) & (np.abs(self.rows @ direction) >= (1 - PARALLEL) * along))
+        if not len(candidates):
             return None
-        j = struck[0]
+        j = candidates[0]
         coefficient = float(self.rows[j] @ direction / (self.rows[j] @ self.rows[j]))
         surface = self.positions[j] - self.scale * gap / coefficient * self.direction
         return np.asarray(surface - math.copysign((1 + BLOCK / 2) * self.radius, coefficient) * self.direction)
 
 
 def check_drawing(drawing: Any, color: Any, model: MultiPhiModel) -> None:
-    """Raises unless ``drawing`` is None or one of this model's structure, and ``color`` four numbers."""
+    """Raise unless ``drawing`` is None or fits the model's structure, and ``color`` is four numbers."""
     shade = real_array("color", color, "four numbers, red, green, blue and opacity")
     if shade.shape != (4,) or not np.all(np.isfinite(shade)):
         raise MultiPhiValueError(f"color: got {color}, need four numbers, red, green, blue and opacity")
@@ -153,14 +154,14 @@ def check_drawing(drawing: Any, color: Any, model: MultiPhiModel) -> None:
 def graphics_of(
     body: MultiPhiBody, drawing: Drawing, color: Sequence[float]
 ) -> Callable[[Any, int], list[dict[str, Any]]]:
-    """A graphicsDataUserFunction of the body's object; color: RGBA of its bars, a negative one is the usual."""
-    shown = BODY if color[0] < 0 else color
+    """The graphicsDataUserFunction of the body's object; color: RGBA of its bars, negative for the default."""
+    visible = BODY if color[0] < 0 else color
     stops = _stops(body.model, drawing)
 
     def draw(mbs: Any, itemNumber: int) -> list[dict[str, Any]]:
-        deflections, closed = _shown_state(mbs, body, drawing.rows)
+        deflections, closed = _visible_state(mbs, body, drawing.rows)
         blocks = [_block(centre, bool(closed[i]), drawing.radius) for i, centre in stops.items()]
-        return _bars(drawing.line(deflections), drawing.radius, shown) + blocks
+        return _bars(drawing.line(deflections), drawing.radius, visible) + blocks
 
     return draw
 
@@ -175,18 +176,18 @@ def _stops(model: MultiPhiModel, drawing: Drawing) -> dict[int, np.ndarray]:
     return {i: centre for i, centre in centres.items() if centre is not None}
 
 
-def _shown_state(mbs: Any, body: MultiPhiBody, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Deflections (k,) [m] and closed contacts (c,) in the state that is on the screen."""
-    outputs, shown = exu.OutputVariableType, exu.ConfigurationType.Visualization
+def _visible_state(mbs: Any, body: MultiPhiBody, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Deflections (k,) [m], and which contacts (c,) are closed, in the state on the screen."""
+    outputs, visible = exu.OutputVariableType, exu.ConfigurationType.Visualization
     kinds = outputs.Coordinates, outputs.Coordinates_t, outputs.Coordinates_tt
-    stored = [np.atleast_1d(mbs.GetNodeOutput(body.items["nGenericODE2"], kind, shown)) for kind in kinds]
+    stored = [np.atleast_1d(mbs.GetNodeOutput(body.items["nGenericODE2"], kind, visible)) for kind in kinds]
     data = np.zeros(0)
     if "nGenericData" in body.items:
-        data = np.atleast_1d(mbs.GetNodeOutput(body.items["nGenericData"], outputs.Coordinates, shown))
-    time = np.array([mbs.systemData.GetTime(shown)])
-    none = np.zeros((body.coordinates.points, 1))  # forces on points are not drawn
-    moved, *_ = rebuilt(body, rows, data[None, :], time, np.concatenate(stored)[None, :], none)
-    return moved[:, 0], body.coordinates.layout.states(data) > 0
+        data = np.atleast_1d(mbs.GetNodeOutput(body.items["nGenericData"], outputs.Coordinates, visible))
+    time = np.array([mbs.systemData.GetTime(visible)])
+    none = np.zeros((body.coordinates.point_count, 1))  # forces on points are not drawn
+    displacements, *_ = reconstruct(body, rows, data[None, :], time, np.concatenate(stored)[None, :], none)
+    return displacements[:, 0], body.coordinates.layout.states(data) > 0
 
 
 def _bars(line: np.ndarray, radius: float, color: Sequence[float]) -> list[dict[str, Any]]:

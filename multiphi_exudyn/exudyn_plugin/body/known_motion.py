@@ -1,7 +1,7 @@
-"""Known motion: the exact motion of a body on which nothing acts but its own loads, computed before Exudyn gets there.
+"""Known motion: the exact motion of a body under its own loads alone, computed before Exudyn's solver reaches it.
 
-It is the library's own run (motion.py), carried on stretch by stretch; of a stretch one may ask for the states
-at given times and for the events with theirs. A run that fails does so at an instant: what is known ends there.
+The motion is a run of the library (motion.py), computed interval by interval. An interval gives the states at any
+times in it and the events with their times. Where the run fails, the interval ends at the time of the failure.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.recorded import Recorded
 from multiphi_exudyn.time.segment import Segments
 
-__all__ = ["KnownMotion", "Moments", "Stretch"]
+__all__ = ["KnownMotion", "LevelStates", "MotionInterval"]
 
 PHASES = tuple(Phase)
 
 
 @dataclass(frozen=True)
-class Moments:
-    """States of one level at k times, ``places`` among those that were asked for.
+class LevelStates:
+    """States of one level at k of the requested times; indices: of these times among all requested ones.
 
-    displacement, velocity: xi, xi' (k, r + h), held places behind eta. phases: numbers (k, e) of those with which the
-    level was entered.
+    displacement, velocity: xi, xi' (k, r + h), eta followed by the stick positions. phases: numbers (k, e) of the
+    phases with which the level was entered.
     """
 
-    places: np.ndarray
+    indices: np.ndarray
     level: LoadedLevel
     displacement: np.ndarray
     velocity: np.ndarray
@@ -42,89 +42,101 @@ class Moments:
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """A motion up to ``end`` [s]. last: the state there. events: in it, at event_times (k,) [s], where truncation took
-    the energies truncated (k,) [J].
+class MotionInterval:
+    """The motion up to ``end`` [s], in the state ``final_state`` there.
 
-    failure: why nothing is known beyond its end, or "". phases (n, e): of all segments, in numbers. alone:
-    levels under static loads alone.
+    events: at event_times (k,) [s], at each of which truncation of modes removes the energy truncated (k,) [J].
+    failure: message of the failure that ends the interval, or "". phases (n, e): numbers of the phases of all segments.
+    static_levels: the levels under static loads alone.
     """
 
     end: float
     events: Sequence[Event]
     event_times: np.ndarray
     truncated: np.ndarray
-    last: State
+    final_state: State
     failure: str
     segments: Segments
     phases: np.ndarray
-    alone: LoadedLevels
+    static_levels: LoadedLevels
 
     @functools.cached_property
-    def changes(self) -> np.ndarray:
-        """When [s] something was decided, ascending: events, and contacts that were refused."""
+    def change_times(self) -> np.ndarray:
+        """Times [s] at which the level or a phase changes, ascending: events and refused requests."""
         return np.union1d(self.segments.starts[1:], self.event_times)
 
-    def at(self, times: np.ndarray) -> Iterator[Moments]:
-        """The states at times (k,) [s], level by level, at an event those after it."""
-        known = np.flatnonzero(times < self.end)
-        owners = self.segments.owners(times[known])
-        states = self.segments.states(owners, times[known] - self.segments.starts[owners])
+    def at(self, times: np.ndarray) -> Iterator[LevelStates]:
+        """The states at times (k,) [s], level by level; at an event those right after it."""
+        before_end = np.flatnonzero(times < self.end)
+        owners = self.segments.owners(times[before_end])
+        states = self.segments.states(owners, times[before_end] - self.segments.starts[owners])
         numbers = self.segments.numbers[owners]
         for number in np.unique(numbers).tolist():
-            own, level = numbers == number, self.segments.levels[number]
-            eta, eta_t = states[:, own, : level.level.modes]
-            yield self._moments(known[own], level, eta, eta_t, self.phases[owners[own]])
-        places = np.flatnonzero(times >= self.end)
-        if len(places):
-            eta, eta_t = (np.tile(x, (len(places), 1)) for x in (self.last.displacement, self.last.velocity))
-            yield self._moments(places, self.last.level, eta, eta_t, _numbers([self.last.phases] * len(places)))
+            in_level, level = numbers == number, self.segments.levels[number]
+            eta, eta_t = states[:, in_level, : level.level.modes]
+            yield self._level_states(before_end[in_level], level, eta, eta_t, self.phases[owners[in_level]])
+        indices = np.flatnonzero(times >= self.end)
+        if len(indices):
+            eta, eta_t = (
+                np.tile(x, (len(indices), 1)) for x in (self.final_state.displacement, self.final_state.velocity)
+            )
+            yield self._level_states(
+                indices, self.final_state.level, eta, eta_t, _phase_numbers([self.final_state.phases] * len(indices))
+            )
 
-    def _moments(
-        self, places: np.ndarray, level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray, phases: np.ndarray
-    ) -> Moments:
-        """In the level under static loads alone."""
+    def _level_states(
+        self, indices: np.ndarray, level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray, phases: np.ndarray
+    ) -> LevelStates:
+        """The states without the channels of the loads, in the level under static loads alone."""
         r = level.modal.modes
-        given = slice(r, r + level.excitation.prescribed)
-        alone = self.alone.level(level.states)
+        channels = slice(r, r + level.excitation.prescribed)
+        level_under_static_loads = self.static_levels.level(level.states)
         if level.excitation.prescribed:
-            xi, xi_t = np.delete(xi, given, axis=1), np.delete(xi_t, given, axis=1)
-        return Moments(places, alone, xi, xi_t, phases)
+            xi, xi_t = np.delete(xi, channels, axis=1), np.delete(xi_t, channels, axis=1)
+        return LevelStates(indices, level_under_static_loads, xi, xi_t, phases)
 
     def levels(self, until: float) -> Iterator[Level]:
         """Levels entered up to a time [s]."""
         for number in set(self.segments.numbers[self.segments.starts <= until].tolist()):
-            yield self.alone.level(self.segments.levels[number].states).level
+            yield self.static_levels.level(self.segments.levels[number].states).level
 
     def largest_energy(self, until: float) -> float:
-        """Of the states in which levels were entered up to a time [s], kinetic and strain [J]."""
+        """Largest kinetic plus strain energy [J] of the states in which segments begin up to a time [s]."""
         starts, largest = self.segments.starts, 0.0
-        for moments in self.at(starts[starts <= until]):
-            eta, eta_t = moments.displacement.T, moments.velocity.T
-            largest = max(largest, float(np.max(moments.level.kinetic(eta_t) + moments.level.strain(eta))))
+        for states in self.at(starts[starts <= until]):
+            eta, eta_t = states.displacement.T, states.velocity.T
+            largest = max(largest, float(np.max(states.level.kinetic(eta_t) + states.level.strain(eta))))
         return largest
 
 
 class KnownMotion:
-    """The motion ``motion``, which others leave alone, from a state and a time [s] on."""
+    """The motion ``motion`` from a state and a time [s] on, computed interval by interval."""
 
     def __init__(self, motion: Motion, state: State, time: float) -> None:
         self._motion = motion
-        self._reached = motion.levels.with_channels(state), time
+        self._continuation = motion.levels.with_channels(state), time
 
-    def advance(self, until: float) -> Stretch:
-        """The next stretch, up to ``until`` [s]."""
+    def advance(self, until: float) -> MotionInterval:
+        """The next interval, up to ``until`` [s]."""
         motion = self._motion
-        motion.go_on_from(*self._reached)
+        motion.go_on_from(*self._continuation)
         motion.advance(until)
-        self._reached = motion.state, motion.time
+        self._continuation = motion.state, motion.time
         times, _, _, truncated = motion.events.table().T
-        segments = Recorded(
-            motion.record, math.nan, math.nan, (0.0, 0.0, 0.0)
-        )  # nobody asks a body for defects and works
-        given = motion.state, motion.message, segments, motion.record.standings()
-        return Stretch(motion.time, motion.events, times, truncated, *given, motion.levels.alone)
+        works = (0.0, 0.0, 0.0)  # a body reports neither defects nor works
+        segments = Recorded(motion.record, math.nan, math.nan, works)
+        return MotionInterval(
+            end=motion.time,
+            events=motion.events,
+            event_times=times,
+            truncated=truncated,
+            final_state=motion.state,
+            failure=motion.message,
+            segments=segments,
+            phases=motion.record.standings(),
+            static_levels=motion.levels.alone,
+        )
 
 
-def _numbers(phases: Sequence[tuple[Phase, ...]]) -> np.ndarray:
+def _phase_numbers(phases: Sequence[tuple[Phase, ...]]) -> np.ndarray:
     return np.array([[PHASES.index(phase) for phase in each] for each in phases], dtype=np.int8)

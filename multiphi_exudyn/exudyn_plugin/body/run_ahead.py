@@ -1,12 +1,12 @@
-"""Run ahead: a body on which nothing acts but its own loads, told to Exudyn from a motion that is known beforehand.
+"""Run ahead: a run of an isolated body, whose exact motion is computed ahead of Exudyn's steps.
 
-At a stop (stops.py) the exact state is written, with the matrices of its level. Between stops Exudyn does the steps on
-its own, and all there is to do for the body is to compare the time with ``next_time``.
+At the end of an event step (stops.py) the exact state is written, with the matrices of its level. Between event steps
+Exudyn's own steps need nothing of the body; it only compares the time with ``next_time``.
 
-Stops are planned many steps ahead, for steps of the length that the run has. One that is met at another time is planned
-again, so steps of any length are right. At every stop Exudyn's coordinates are compared with what its steps make of the
-last ones: whoever has changed them on the way, unseen, ends the run. Steps of unequal length, which cannot be told from
-afar, are looked at one by one from then on.
+Event steps are planned many steps ahead, for the present step size. Where a step ends at another time than planned, the
+plan is made anew, so any step size gives right results. At every event step Exudyn's coordinates are compared with
+those that undisturbed steps give: if anything else has changed them, the run ends with an error. After a change of the
+step size, which the body sees only at the next event step, every step is checked.
 """
 
 from __future__ import annotations
@@ -23,187 +23,194 @@ from multiphi_exudyn.exudyn_plugin.body.coordinates import SAME_STEP
 from multiphi_exudyn.exudyn_plugin.body.known_motion import KnownMotion
 from multiphi_exudyn.exudyn_plugin.body.run_checks import check_matched
 from multiphi_exudyn.exudyn_plugin.body.run_record import RunRecord
-from multiphi_exudyn.exudyn_plugin.body.stops import Departure, KnownBody, Stops, stops_of, swings
+from multiphi_exudyn.exudyn_plugin.body.stops import EventSteps, IsolatedBody, PlanStart, amplitudes, plan_event_steps
 from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedSteps
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 
 __all__ = ["RunAhead"]
 
-SAME_TIME = 1e-12  # relative: what adding up thousands of steps leaves of a time
-STEPS_AHEAD = 2**14  # planned at once, of which few are stops: computed in the time of as many steps of Exudyn
-ROWS_AHEAD = 2**8  # planned at once where every step is a stop
-CHANGED = 1e-6  # of how far the modes go: more than Newton's iterations leave, less than anybody means to change
-UNSEEN = 1e-3  # of what brings a contact to its stop: coordinates this small are compared with it
+SAME_TIME = 1e-12  # relative: round-off of a time that is a sum of thousands of steps
+STEPS_AHEAD = 2**14  # planned at once where few are event steps: takes no longer than as many steps of Exudyn
+ROWS_AHEAD = 2**8  # planned at once where every step is an event step
+CHANGED = 1e-6  # of the modes' amplitude: more than the error of Newton's iterations, less than a deliberate change
+UNSEEN = 1e-3  # of the displacement at which contacts change: smaller amplitudes are compared with this part of it
 
 
 class RunAhead:
     """One run of ``body`` along ``motion``, from time to ``end`` [s] in steps of length ``step`` [s].
 
-    record: is told of what has happened. running: until another solver begins. next_time: the end of a step at this
-    time [s] or later is to be reported (``arrive``). time, index: of the last one that was.
+    record: of levels and energies, for the warnings. running: until another solver begins. next_time: ``after_step``
+    is to be called at the first end of a step at this time [s] or later. time, index: of its last call.
     """
 
     def __init__(
-        self, body: KnownBody, motion: KnownMotion, record: RunRecord, time: float, step: float, end: float
+        self, body: IsolatedBody, motion: KnownMotion, record: RunRecord, time: float, step: float, end: float
     ) -> None:
-        here = body.coordinates
+        coordinates = body.coordinates
         self.running, self.next_time = True, -math.inf
         self.time, self.index = time, 0
         self._body, self._motion, self._record = body, motion, record
-        self._step, self._rounding, self._end = step, SAME_STEP * step, end
+        self._step_size, self._rounding, self._end = step, SAME_STEP * step, end
         self._regular = True
-        self._state = np.array(here.views)
-        states = here.stepped.states
-        self._way = body.own.levels.further(states, "way", lambda: _way(here.stepped))
-        self._past, self._truncated = list[Sequence[Event]](), 0.0
-        self._stretch = self._motion.advance(self._until(time))
-        self._place = self._done = 0
-        self._stops = self._planned(missed=False)
+        self._state = np.array(coordinates.views)
+        states = coordinates.stepped.states
+        self._displacement_scale = body.own_loads.static_levels.further(
+            states, "displacement scale", lambda: _displacement_scale(coordinates.stepped)
+        )
+        self._past_events, self._truncated = list[Sequence[Event]](), 0.0
+        self._interval = self._motion.advance(self._plan_end(time))
+        self._next = self._changes_passed = 0
+        self._steps = self._plan(missed=False)
 
     @property
     def events(self) -> list[Event]:
-        """What has happened so far."""
-        before = [event for events in self._past for event in events]
-        return before + list(self._stretch.events[: self._told])
+        """Events of the run so far."""
+        before = [event for events in self._past_events for event in events]
+        return before + list(self._interval.events[: self._event_count])
 
-    def recorded(self) -> float:
-        """Bring the record up to date; energy [J] that truncation took so far."""
-        for level in self._stretch.levels(self.time):
-            self._record.include(level)
-        if not self._body.own.loaded.isolated:
-            self._record.reach(self._stretch.largest_energy(self.time))
-        return self._truncated + float(np.sum(self._stretch.truncated[: self._told]))
+    def update_record(self) -> float:
+        """Bring the record up to date, and return the energy [J] that truncation has removed so far."""
+        for level in self._interval.levels(self.time):
+            self._record.include_level(level)
+        if not self._body.own_loads.loaded_levels.isolated:
+            self._record.include_energy(self._interval.largest_energy(self.time))
+        return self._truncated + float(np.sum(self._interval.truncated[: self._event_count]))
 
     @property
-    def _told(self) -> int:
-        """How many events of the stretch have happened."""
-        stretch = self._stretch
-        since = stretch.changes[self._done] if self._done < len(stretch.changes) else math.inf
-        return int(np.searchsorted(stretch.event_times, since))
+    def _event_count(self) -> int:
+        """Number of events of the interval that have happened."""
+        interval, passed = self._interval, self._changes_passed
+        next_change = interval.change_times[passed] if passed < len(interval.change_times) else math.inf
+        return int(np.searchsorted(interval.event_times, next_change))
 
-    # ------------------------------------------------------------------ a stop
+    # ------------------------------------------------------------------ end of a step
 
     def begin(self, mbs: Any) -> None:
-        """The run begins."""
-        if self._stops_at(self.time):
-            self._write(mbs)
-        self.next_time = self._next()
+        """Begin the run."""
+        if self._is_event_step(self.time):
+            self._write_state(mbs)
+        self.next_time = self._next_time()
 
-    def arrive(self, mbs: Any, t: float, index: int) -> None:
-        """A step has ended at t [s], the ``index``-th of the run."""
-        k, stops, here = self._place, self._stops, self._body.coordinates
-        if self._meets(t) and index == stops.indices[k]:
-            self._check(here.views[0], stops.expected[k], stops.largest[k], t)
+    def after_step(self, mbs: Any, t: float, index: int) -> None:
+        """Handle the end of a step at t [s], the ``index``-th of the run."""
+        k, steps, coordinates = self._next, self._steps, self._body.coordinates
+        if self._is_planned(t) and index == steps.indices[k]:
+            self._check_undisturbed(coordinates.views[0], steps.expected[k], steps.largest[k], t)
         elif index > self.index:
-            self._check_steps(t, index)
-        if not self._stops_at(t):
-            self._state = np.array(here.views)
-            if not self._is_over(t):
-                self._plan(t, index)
-        if self._stops_at(t):
-            self._write(mbs)
-        self.time, self.index, self.next_time = t, index, self._next()
+            self._check_unplanned_steps(t, index)
+        if not self._is_event_step(t):
+            self._state = np.array(coordinates.views)
+            if not self._is_complete(t):
+                self._extend_plan(t, index)
+        if self._is_event_step(t):
+            self._write_state(mbs)
+        self.time, self.index, self.next_time = t, index, self._next_time()
 
-    def _meets(self, t: float) -> bool:
-        """Whether the next step that is planned ends at t."""
-        times = self._stops.times
-        return self._place < len(times) and abs(times[self._place] - t) <= SAME_TIME * t
+    def _is_planned(self, t: float) -> bool:
+        """Whether the next planned step ends at t [s]."""
+        times = self._steps.times
+        return self._next < len(times) and abs(times[self._next] - t) <= SAME_TIME * t
 
-    def _stops_at(self, t: float) -> bool:
-        """Whether it does, and is a stop."""
-        return self._place < len(self._stops.levels) and self._meets(t)
+    def _is_event_step(self, t: float) -> bool:
+        """Whether an event step ends at t [s]."""
+        return self._next < len(self._steps.levels) and self._is_planned(t)
 
-    def _is_over(self, t: float) -> bool:
-        """Whether the run ends at t, where nothing is left to be told."""
-        stretch = self._stretch
-        told = self._done == len(stretch.changes) and not (stretch.failure or self._body.varies)
-        return told and min(t, stretch.end) >= self._end - self._rounding
+    def _is_complete(self, t: float) -> bool:
+        """Whether the run ends at t [s], and nothing is left to be written or raised."""
+        interval = self._interval
+        all_passed = self._changes_passed == len(interval.change_times)
+        nothing_left = all_passed and not (interval.failure or self._body.varies)
+        return nothing_left and min(t, interval.end) >= self._end - self._rounding
 
-    def _write(self, mbs: Any) -> None:
-        stops, k, here = self._stops, self._place, self._body.coordinates
-        stepped, self._state = stops.levels[k], stops.states[k]
-        held = here.layout.held(stops.data[k])
-        here.enter_with(mbs, stepped, held, stepped.drive)
-        here.write(stepped, held, self._state)
-        here.store(stops.data[k])
-        self._done, self._place = stops.done[k], k + 1
+    def _write_state(self, mbs: Any) -> None:
+        """Write the exact state at the end of an event step into the system."""
+        steps, k, coordinates = self._steps, self._next, self._body.coordinates
+        stepped, self._state = steps.levels[k], steps.states[k]
+        held = coordinates.layout.held(steps.data[k])
+        coordinates.set_level_if_changed(mbs, stepped, held, stepped.drive)
+        coordinates.write(stepped, held, self._state)
+        coordinates.write_level_data(steps.data[k])
+        self._changes_passed, self._next = steps.changes_passed[k], k + 1
 
-    def _next(self) -> float:
+    def _next_time(self) -> float:
+        """Time [s] from which on the next end of a step is to be handled, -inf for every step."""
         if not self._regular or self._body.varies:
             return -math.inf
-        last = self._stretch.end + (0.0 if self._stretch.failure else self._rounding)
-        due = self._stops.due[self._place] if self._place < len(self._stops.due) else last
+        last = self._interval.end + (0.0 if self._interval.failure else self._rounding)
+        due = self._steps.due_times[self._next] if self._next < len(self._steps.due_times) else last
         return min(due, self._end - self._rounding)
 
-    def _check_steps(self, t: float, index: int) -> None:
-        """Look at the steps since the last report, which were not planned to end here."""
-        count, here = index - self.index, self._body.coordinates
+    def _check_unplanned_steps(self, t: float, index: int) -> None:
+        """Check the steps since the last call of ``after_step``; the last of them is not in the plan."""
+        count, coordinates = index - self.index, self._body.coordinates
         step = (t - self.time) / count
-        regular = abs(step - self._step) <= self._rounding
+        regular = abs(step - self._step_size) <= self._rounding
         if not regular:
             check_matched(self._body, step)
             self._regular = False
             if count > 1:
                 return
-        steps = self._steps_of(here.stepped) if regular else UndisturbedSteps(here.stepped, step)
+        steps = self._undisturbed_steps(coordinates.stepped) if regular else UndisturbedSteps(coordinates.stepped, step)
         expected = steps.after(self._state[None], np.array([count]))[0, 0]
-        self._check(here.views[0], expected, float(swings(self._state[None], steps.periods)[0]), t)
+        self._check_undisturbed(
+            coordinates.views[0], expected, float(amplitudes(self._state[None], steps.periods)[0]), t
+        )
 
-    def _check(self, q: np.ndarray, expected: np.ndarray, largest: float, t: float) -> None:
-        """Raises if somebody has changed the coordinates since the last stop."""
-        here, way = self._body.coordinates, self._way
-        if here.slips:  # what stays where it is held moves its modes by nothing
-            way += float(np.linalg.norm(here.stepped.loaded.channels.shapes @ here.held))
-        apart, limit = q - expected, CHANGED * max(largest, UNSEEN * way)
-        off = apart.dot(apart)  # free modes do not swing: of those counts how far they are
-        if not (off <= limit * limit or off <= CHANGED**2 * expected.dot(expected)):
+    def _check_undisturbed(self, q: np.ndarray, expected: np.ndarray, largest: float, t: float) -> None:
+        """Raise if anything but Exudyn's steps has changed the coordinates since the last event step."""
+        coordinates, scale = self._body.coordinates, self._displacement_scale
+        if coordinates.has_friction:  # a stick position displaces the structure without any modal motion
+            scale += float(np.linalg.norm(coordinates.stepped.loaded.channels.shapes @ coordinates.held))
+        difference, limit = q - expected, CHANGED * max(largest, UNSEEN * scale)
+        square = difference.dot(difference)  # modes of zero frequency have no amplitude: compared with their distance
+        if not (square <= limit * limit or square <= CHANGED**2 * expected.dot(expected)):
             raise MultiPhiValueError(
                 f"coordinates of {self._body.name!r}: got values at t = {t:.9g} s that something else has set, need "
                 "the PreStep or PostStep function that sets them to be there before the run begins"
             )
 
-    def _steps_of(self, stepped: SteppedLevel) -> UndisturbedSteps:
-        step, levels = self._step, self._body.own.levels
+    def _undisturbed_steps(self, stepped: SteppedLevel) -> UndisturbedSteps:
+        step, levels = self._step_size, self._body.own_loads.static_levels
         return levels.further(stepped.states, ("steps", stepped.step, step), lambda: UndisturbedSteps(stepped, step))
 
-    # ------------------------------------------------------------------ what comes
+    # ------------------------------------------------------------------ the plan
 
-    def _plan(self, t: float, index: int) -> None:
-        """The stops from the end of a step at t [s] on, as far as one looks ahead."""
+    def _extend_plan(self, t: float, index: int) -> None:
+        """Plan the next event steps, from the end of a step at t [s] on."""
         self.time, self.index = t, index
-        if self._stretch.failure and t >= self._stretch.end:
-            self._done = len(self._stretch.changes)
-            raise NumericalFailure(f"body {self._body.name!r}: {self._stretch.failure}")
-        left = self._done < len(self._stretch.changes)
-        spent = self._stretch.end <= t + (0.0 if left else self._rounding)
-        missed = left and spent
-        if missed or (spent and self._stretch.end < self._end - self._rounding):
-            self._done = len(self._stretch.changes)
-            self._truncated = self.recorded()
-            self._past.append(self._stretch.events)
-            self._stretch, self._done = self._motion.advance(self._until(t)), 0
-        self._stops, self._place = self._planned(missed), 0
+        if self._interval.failure and t >= self._interval.end:
+            self._changes_passed = len(self._interval.change_times)
+            raise NumericalFailure(f"body {self._body.name!r}: {self._interval.failure}")
+        pending = self._changes_passed < len(self._interval.change_times)
+        used_up = self._interval.end <= t + (0.0 if pending else self._rounding)
+        missed = pending and used_up
+        if missed or (used_up and self._interval.end < self._end - self._rounding):
+            self._changes_passed = len(self._interval.change_times)
+            self._truncated = self.update_record()
+            self._past_events.append(self._interval.events)
+            self._interval, self._changes_passed = self._motion.advance(self._plan_end(t)), 0
+        self._steps, self._next = self._plan(missed), 0
 
     @property
-    def _most(self) -> int:
-        """How many ends of steps are looked at together."""
+    def _plan_length(self) -> int:
+        """Number of steps that are planned together."""
         if not self._regular:
             return 1
         return ROWS_AHEAD if self._body.varies else STEPS_AHEAD
 
-    def _until(self, t: float) -> float:
-        """How far [s] to look ahead."""
-        return max(t, min(t + self._step * (self._most - 1), self._end))
+    def _plan_end(self, t: float) -> float:
+        """Time [s] up to which the motion is to be computed."""
+        return max(t, min(t + self._step_size * (self._plan_length - 1), self._end))
 
-    def _planned(self, missed: bool) -> Stops:
+    def _plan(self, missed: bool) -> EventSteps:
         level = self._body.coordinates.stepped
-        start = Departure(self.time, self.index, self._step, level, self._state, self._done)
-        return stops_of(self._body, self._stretch, start, self._steps_of, self._most, missed)
+        start = PlanStart(self.time, self.index, self._step_size, level, self._state, self._changes_passed)
+        return plan_event_steps(self._body, self._interval, start, self._undisturbed_steps, self._plan_length, missed)
 
 
-def _way(stepped: SteppedLevel) -> float:
-    """How far modes go from the asymptotic configuration to where contacts change [m kg^1/2]."""
+def _displacement_scale(stepped: SteppedLevel) -> float:
+    """Modal displacement [m kg^1/2] of the asymptotic configuration and of the largest gap, as a scale."""
     base = stepped.loaded.level.base
     sizes = np.linalg.norm(base.directions, axis=0)
-    ways = np.divide(np.abs(base.gaps), sizes, out=np.zeros(len(sizes)), where=sizes > 0)
-    return float(np.linalg.norm(stepped.loaded.asymptotic.configuration) + np.max(ways, initial=0.0))
+    distances = np.divide(np.abs(base.gaps), sizes, out=np.zeros(len(sizes)), where=sizes > 0)
+    return float(np.linalg.norm(stepped.loaded.asymptotic.configuration) + np.max(distances, initial=0.0))

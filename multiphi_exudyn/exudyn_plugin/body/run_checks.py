@@ -1,4 +1,4 @@
-"""Run checks: what a body needs of the solver, of its steps, and of the system at the start of a run."""
+"""Run checks: requirements of a body on the solver, on its step size, and on the system at the start of a run."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of
 
 __all__ = ["check_integration", "check_matched", "check_start"]
 
-ROUND_OFF = 1e-12  # of the energy at the start: an impact that takes less is none
+ROUND_OFF = 1e-12  # of the energy at the start: an impact with a smaller loss is none
 
 
 class CheckedBody(Protocol):
-    """What is needed of a body. matched_step: that its modes are matched to [s], or None."""
+    """Attributes of a body that the checks need; matched_step: step size [s] its modes are matched to, or None."""
 
     name: str
     items: dict[str, Any]
@@ -26,7 +26,7 @@ class CheckedBody(Protocol):
 
 
 def check_matched(body: CheckedBody, step: float) -> None:
-    """Raises where steps of this length [s] are not those to which modes are matched."""
+    """Raise where modes are matched to another step size than this one [s]."""
     if body.matched_step is not None and abs(step - body.matched_step) > SAME_STEP * step:
         raise MultiPhiValueError(
             f"matchedStepSize of {body.name!r}: got {body.matched_step:g} s and a solver's step of "
@@ -35,7 +35,10 @@ def check_matched(body: CheckedBody, step: float) -> None:
 
 
 def check_integration(body: CheckedBody, settings: Any, trapezoidal: bool) -> None:
-    """Raises for settings of an implicit solver that make a body wrong; TrapezoidalIndex2 has its own."""
+    """Raise for settings of an implicit solver with which a body is not exact or unstable.
+
+    trapezoidal: whether the solver is TrapezoidalIndex2, which does not use the settings of GeneralizedAlpha.
+    """
     integration, interface = settings.timeIntegration.generalizedAlpha, body.coordinates.interface
     if not (trapezoidal or integration.useNewmark) and integration.spectralRadius != 1:
         other = "" if interface is not None else " (or spectralRadius = 1)"
@@ -51,28 +54,28 @@ def check_integration(body: CheckedBody, settings: Any, trapezoidal: bool) -> No
         )
 
 
-def check_start(mbs: Any, body: CheckedBody, given: Sequence[np.ndarray], lost: float) -> None:
-    """Raises for what cannot be struck together with a body that has rigid contacts.
+def check_start(mbs: Any, body: CheckedBody, start: Sequence[np.ndarray], loss: float) -> None:
+    """Raise for masses and constraints that cannot take part in impacts of a body with rigid contacts.
 
-    given: q, q' (s,) as it was made; lost: what impacts took there [J].
+    start: q, q' (s,) at creation; loss: energy loss of the impacts there [J].
     """
-    here = body.coordinates
-    around = here.surroundings or here.beside(mbs)
-    if around.on_body(here.stepped.mass):
+    coordinates = body.coordinates
+    system = coordinates.system or coordinates.system_around(mbs)
+    if system.acts_on_body(coordinates.stepped.mass):
         raise MultiPhiValueError(
             f"node of {body.name!r}: got a mass or a constraint on the node of a body with rigid contacts, need it "
             "on an interface coordinate or as part of the structure, or contacts of finite stiffness"
         )
-    around.apart = {
+    system.exclusive_bodies = {
         mbs.GetNodeODE2Index(other.items["nGenericODE2"]): other.name
         for other in bodies_of(mbs).values()
         if other is not body and other.rigid
     }
-    attached = around.hanging(around.present(), here.stepped.mass).attached
-    q_t = here.views[1]
-    fresh = np.array_equal(here.views[:2], given)
-    struck = fresh and lost > ROUND_OFF * (lost + 0.5 * float(q_t @ q_t))
-    if struck and np.any(attached.impedance(np.eye(len(attached.mass)))):
+    inertia = system.attached_parts(system.copy_state(), coordinates.stepped.mass).inertia
+    q_t = coordinates.views[1]
+    as_created = np.array_equal(coordinates.views[:2], start)
+    has_impact = as_created and loss > ROUND_OFF * (loss + 0.5 * float(q_t @ q_t))
+    if has_impact and np.any(inertia.impedance(np.eye(len(inertia.mass)))):
         raise MultiPhiValueError(
             f"start of {body.name!r}: got a velocity into a rigid contact, with masses or constraints on the "
             "interface, need a start without an impact"

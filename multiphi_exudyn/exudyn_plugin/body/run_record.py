@@ -1,4 +1,4 @@
-"""Record of a run in Exudyn: what a body has to know of it to say how far it can be trusted (reliability.py)."""
+"""Record of a run in Exudyn: levels and energies, from which the warnings of a body are derived (reliability.py)."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ __all__ = ["RunRecord"]
 
 
 class RunRecord:
-    """Levels that a run has been in, what it lost at its start, and its largest energy [J] there and after events."""
+    """Levels of a run, the energy lost at its start, and its largest energy [J] there and after events."""
 
     def __init__(self, start: State, lost: Loss) -> None:
         self._levels: dict[tuple[int, ...], Level] = {}
         self._truncated = _truncated(lost)
         self._energy = 0.0
-        self.see(start, lost.total)
+        self.include_state(start, lost.total)
 
-    def see(self, state: State, lost: float = 0.0) -> None:
-        """Count a state among those of the run; lost: energy [J] that it had before besides."""
-        self.include(state.level.level)
-        self.reach(state.kinetic + float(state.level.strain(state.displacement)) + lost)
+    def include_state(self, state: State, lost: float = 0.0) -> None:
+        """Include the level and the energy of a state; lost: energy [J] lost right before, which is added."""
+        self.include_level(state.level.level)
+        self.include_energy(state.kinetic + float(state.level.strain(state.displacement)) + lost)
 
-    def include(self, level: Level) -> None:
-        """Count a level among those of the run."""
+    def include_level(self, level: Level) -> None:
+        """Include a level."""
         self._levels.setdefault(level.indices, level)
 
-    def reach(self, energy: float) -> None:
-        """Count an energy [J] among those of the run."""
+    def include_energy(self, energy: float) -> None:
+        """Include an energy [J] in the largest one."""
         self._energy = max(self._energy, energy)
 
-    def of(self, lost: Loss, truncated: float) -> RunSummary:
-        """The summary with what was lost at events, and truncated at others [J]."""
+    def summary(self, lost: Loss, truncated: float) -> RunSummary:
+        """Summary of the run; lost: at events, truncated: at events that ``lost`` does not contain [J]."""
         return RunSummary(tuple(self._levels.values()), self._truncated + _truncated(lost) + truncated, self._energy)
 
 

@@ -1,7 +1,7 @@
-"""Sensors of a Multi-Phi body, and histories rebuilt from them after a run (rebuilt.py).
+"""Sensors of a Multi-Phi body, and histories that are computed from them after a run (rebuilt.py).
 
-Exudyn's own node sensors record eta, its derivatives and the level with its held places, and cost next to nothing
-during a run.
+Exudyn's own node sensors record eta, its derivatives and the level with its stick positions, at hardly any cost during
+a run.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from multiphi_exudyn.display import Shown, kinds, names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.events.state import Event
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
-from multiphi_exudyn.exudyn_plugin.body.rebuilt import rebuilt
+from multiphi_exudyn.exudyn_plugin.body.rebuilt import reconstruct
 from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of
 from multiphi_exudyn.mechanics.arguments import no_text
 from multiphi_exudyn.mechanics.element import links_of
@@ -35,9 +35,9 @@ RECORDED = {
 
 @dataclass(frozen=True, repr=False)
 class BodyHistories(Shown):
-    """What a body's sensors recorded: k samples at ``sensors.writePeriod``; for an event list exact times.
+    """Histories from a body's sensors: k samples at ``sensors.writePeriod``; the list of events has exact times.
 
-    Made by ``body_histories``.
+    Returned by ``body_histories``.
 
     Attributes
     ----------
@@ -58,13 +58,13 @@ class BodyHistories(Shown):
     friction_force : mapping of str to array (k,)
         Friction, or contact that has friction, to T [N].
     slip : mapping of str to array (k,)
-        The same to the way [m] of its patch.
+        Friction, or contact that has friction, to the slip distance [m].
     stick_intervals : mapping of str to array (m, 2)
-        The same to (sticks from, slips from) [s].
+        Friction, or contact that has friction, to (start, end) of each interval of stick [s].
     events : tuple of Event
         In order of time, with times inside steps.
     warnings : tuple of str
-        What to distrust in the run.
+        Warnings about the accuracy of the run.
 
     Examples
     --------
@@ -119,7 +119,7 @@ class BodyHistories(Shown):
 
 
 def add_sensors(mbs: Any, body: MultiPhiBody) -> dict[str, Any]:
-    """Sensors of the node's coordinates and of the level; all are kept in memory, none is written to a file."""
+    """Add sensors of the node's coordinates and of the level, which record in memory; return their indices by key."""
     items = {key: _sensor(mbs, body, key, "nGenericODE2", kind) for key, kind in RECORDED.items()}
     if "nGenericData" in body.items:
         items["sLevel"] = _sensor(mbs, body, "sLevel", "nGenericData", exu.OutputVariableType.Coordinates)
@@ -150,7 +150,7 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     items : mapping
         As ``CreateMultiPhiBody`` returned it.
     points : iterable of str, default None
-        Names to rebuild, None for all of the structure's.
+        Names of points whose histories are returned, None for all points of the structure.
 
     Returns
     -------
@@ -160,7 +160,7 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     Raises
     ------
     MultiPhiValueError
-        For items of no body of this system, a system that has not run, and points that there are not.
+        For items of no body of this system, a system that has not run, and points that do not exist.
 
     Examples
     --------
@@ -200,21 +200,21 @@ def body_histories(mbs: Any, items: Mapping[str, Any], points: Iterable[str] | N
     names = body.model.structure.points if points is None else list(points)
     rows = np.array([body.model.structure.row(name) for name in names]).reshape(-1, body.model.structure.n)
     stored = np.hstack([table[key][:, 1:] for key in RECORDED])
-    values = rebuilt(body, rows, data, time, stored, np.hstack([data[:, :0], *on_points]).T)
-    moved, rates, gaps, forces, tensions, patches = values
+    values = reconstruct(body, rows, data, time, stored, np.hstack([data[:, :0], *on_points]).T)
+    displacements, velocities, gaps, forces, friction_forces, patch_positions = values
     model = body.model
     contacts = {c.name: i for i, c in enumerate(model.contacts) if not c.held}
     frictions = {model.contacts[i].name: i for i in model.rubbing}
     return BodyHistories(
         time=time,
-        points=dict(zip(names, moved, strict=True)),
-        velocities=dict(zip(names, rates, strict=True)),
+        points=dict(zip(names, displacements, strict=True)),
+        velocities=dict(zip(names, velocities, strict=True)),
         gaps={name: gaps[i] for name, i in contacts.items()},
         contact_force={name: forces[i] for name, i in contacts.items()},
         contact_intervals={name: _intervals(body, i, data, time, held=False) for name, i in contacts.items()},
-        closed={name: _holds(body, i, data, held=False) for name, i in contacts.items()},
-        friction_force={name: tensions[i] for name, i in frictions.items()},
-        slip={name: patches[i] - patches[i, 0] for name, i in frictions.items()},
+        closed={name: _is_acting(body, i, data, held=False) for name, i in contacts.items()},
+        friction_force={name: friction_forces[i] for name, i in frictions.items()},
+        slip={name: patch_positions[i] - patch_positions[i, 0] for name, i in frictions.items()},
         stick_intervals={
             name: np.array(_intervals(body, i, data, time, held=True)).reshape(-1, 2) for name, i in frictions.items()
         },
@@ -234,29 +234,31 @@ def _body_of(mbs: Any, items: Mapping[str, Any]) -> MultiPhiBody:
     )
 
 
-def _holding(body: MultiPhiBody, element: int, held: bool) -> np.ndarray:
-    """In which of an element's states (n,) a link holds that has a held place, or one that has none."""
+def _acting_states(body: MultiPhiBody, element: int, held: bool) -> np.ndarray:
+    """In which of an element's states (n,) a link with (``held``) or without stick position acts."""
     contact = body.model.contacts[element]
     links = links_of([contact])
     return np.array([any(links[k].held == held for k in state.holds) for state in contact.states])
 
 
-def _holds(body: MultiPhiBody, element: int, data: np.ndarray, held: bool) -> np.ndarray:
-    """When (k,) such a link of an element holds."""
-    return np.asarray(_holding(body, element, held)[body.coordinates.layout.states(data)[:, element]])
+def _is_acting(body: MultiPhiBody, element: int, data: np.ndarray, held: bool) -> np.ndarray:
+    """At which samples (k,) a link of an element with (``held``) or without stick position acts."""
+    return np.asarray(_acting_states(body, element, held)[body.coordinates.layout.states(data)[:, element]])
 
 
 def _intervals(
     body: MultiPhiBody, element: int, data: np.ndarray, time: np.ndarray, held: bool
 ) -> list[tuple[float, float]]:
-    """[(from, to), ...] [s] in which such a link of an element holds, from events; instants are left out."""
+    """Intervals [(start, end), ...] [s] in which such a link acts, from the events; those of no length are left out."""
     contact, end = body.model.contacts[element], float(time[-1])
-    holds = dict(zip((state.name for state in contact.states), _holding(body, element, held).tolist(), strict=True))
-    changes = [(e.time, holds[e.state]) for e in body.events if e.contact == contact.name]
-    changes = [(float(time[0]), bool(_holds(body, element, data, held)[0])), *changes, (end, False)]
-    found = list[tuple[float, float]]()
-    for (start, closed), (until, _) in itertools.pairwise(changes):
-        if closed and until > start:
-            joins = bool(found) and found[-1][1] == start
-            found[-1:] = [(found[-1][0], until)] if joins else [*found[-1:], (start, until)]
-    return found
+    acts_in = dict(
+        zip((state.name for state in contact.states), _acting_states(body, element, held).tolist(), strict=True)
+    )
+    changes = [(e.time, acts_in[e.state]) for e in body.events if e.contact == contact.name]
+    changes = [(float(time[0]), bool(_is_acting(body, element, data, held)[0])), *changes, (end, False)]
+    intervals = list[tuple[float, float]]()
+    for (start, acts), (until, _) in itertools.pairwise(changes):
+        if acts and until > start:
+            joins = bool(intervals) and intervals[-1][1] == start
+            intervals[-1:] = [(intervals[-1][0], until)] if joins else [*intervals[-1:], (start, until)]
+    return intervals

@@ -1,9 +1,9 @@
-"""SolveDynamic with Multi-Phi bodies: what they need of the solver is checked before it starts.
+"""SolveDynamic with Multi-Phi bodies: their requirements on the solver are checked before it starts.
 
-Inside a run Exudyn wraps what a body raises in an error of its own, which blames the user's functions. Called as a
-method of the system or from Exudyn's modules, SolveDynamic checks before, and so does an explicit solver that is called
-itself; what a body raises in a run comes out as it is. A run of the implicit solver, by SolveDynamic or not, in which
-the bodies have not been called to its end raises then.
+Exudyn wraps an error that a body raises during a run in an error about user functions. Therefore SolveDynamic checks
+beforehand, as a method of the system and as a function of Exudyn's modules, and so does the explicit solver when it is
+called itself; errors of bodies during a run are raised without Exudyn's wrapping. Any run of the implicit solver in
+which the bodies were not called up to its end raises an error at its end.
 """
 
 from __future__ import annotations
@@ -24,75 +24,78 @@ from multiphi_exudyn.exudyn_plugin.body.switching import BODIES, check_solver
 __all__ = ["install_checks"]
 
 IMPLICIT = (exu.DynamicSolverType.GeneralizedAlpha, exu.DynamicSolverType.TrapezoidalIndex2)
-_CHECKED = "_multiPhiChecked"  # marks a function that checks already
+_CHECKED = "_multiPhiChecked"  # attribute of a function that already checks
 
 
 def install_checks() -> None:
-    """Let Exudyn's SolveDynamic check what Multi-Phi bodies need; systems without them are solved as before."""
-    for place in (exu.MainSystem, exu, exu.solver):
-        present = place.SolveDynamic
+    """Make Exudyn's SolveDynamic check the requirements of Multi-Phi bodies; other systems are solved as before."""
+    for owner in (exu.MainSystem, exu, exu.solver):
+        present = owner.SolveDynamic
         if not hasattr(present, _CHECKED):
-            place.SolveDynamic = _checked(present)
-    for solver, watched in ((exu.MainSolverImplicitSecondOrder, _watched), (exu.MainSolverExplicit, _refused)):
+            owner.SolveDynamic = _with_check(present)
+    for solver, wrapper in (
+        (exu.MainSolverImplicitSecondOrder, _with_end_check),
+        (exu.MainSolverExplicit, _with_refusal),
+    ):
         if not hasattr(solver.SolveSystem, _CHECKED):
-            solver.SolveSystem = watched(solver.SolveSystem)
+            solver.SolveSystem = wrapper(solver.SolveSystem)
 
 
-def _checked(solve: Callable[..., Any]) -> Callable[..., Any]:
+def _with_check(solve: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(solve)
     def solve_dynamic(
-        mbs: Any, simulationSettings: Any = None, solverType: Any = None, *given: Any, **named: Any
+        mbs: Any, simulationSettings: Any = None, solverType: Any = None, *arguments: Any, **keywords: Any
     ) -> Any:
         bodies = mbs.variables.get(BODIES)
-        if bodies is not None and bodies.installed(mbs):
+        if bodies is not None and bodies.is_installed(mbs):
             settings = exu.SimulationSettings() if simulationSettings is None else simulationSettings
             kind = settings.timeIntegration.solverType if solverType is None else solverType
             check_solver(kind in IMPLICIT, kind.name, bodies)
             for body in bodies.values():
                 check_integration(body, settings, trapezoidal=kind == exu.DynamicSolverType.TrapezoidalIndex2)
-        with _own_errors():
-            return solve(mbs, simulationSettings, solverType, *given, **named)
+        with _unwrapped_errors():
+            return solve(mbs, simulationSettings, solverType, *arguments, **keywords)
 
     setattr(solve_dynamic, _CHECKED, True)
     return solve_dynamic
 
 
-def _watched(solve: Callable[..., Any]) -> Callable[..., Any]:
+def _with_end_check(solve: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(solve)
-    def solve_system(solver: Any, mbs: Any, *given: Any, **named: Any) -> Any:
+    def solve_system(solver: Any, mbs: Any, *arguments: Any, **keywords: Any) -> Any:
         bodies = mbs.variables.get(BODIES)
         if bodies is None:
-            return solve(solver, mbs, *given, **named)
-        bodies.begin()
+            return solve(solver, mbs, *arguments, **keywords)
+        bodies.begin_run()
         try:
-            with _own_errors():
-                found = solve(solver, mbs, *given, **named)
+            with _unwrapped_errors():
+                result = solve(solver, mbs, *arguments, **keywords)
         except BaseException:
             bodies.clock.next_time = -math.inf
             raise
         if solver.output.finishedSuccessfully:
             bodies.check_called(solver.it.currentTime)
-        return found
+        return result
 
     setattr(solve_system, _CHECKED, True)
     return solve_system
 
 
-def _refused(solve: Callable[..., Any]) -> Callable[..., Any]:
+def _with_refusal(solve: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(solve)
-    def solve_system(solver: Any, mbs: Any, *given: Any, **named: Any) -> Any:
+    def solve_system(solver: Any, mbs: Any, *arguments: Any, **keywords: Any) -> Any:
         bodies = mbs.variables.get(BODIES)
-        if bodies is not None and bodies.installed(mbs):
+        if bodies is not None and bodies.is_installed(mbs):
             check_solver(False, type(solver).__name__, bodies)
-        return solve(solver, mbs, *given, **named)
+        return solve(solver, mbs, *arguments, **keywords)
 
     setattr(solve_system, _CHECKED, True)
     return solve_system
 
 
 @contextmanager
-def _own_errors() -> Iterator[None]:
-    """What a body raised in a user function of Exudyn, without Exudyn's error around it."""
+def _unwrapped_errors() -> Iterator[None]:
+    """Raise errors of bodies in user functions without Exudyn's error around them."""
     try:
         yield
     except Exception as error:

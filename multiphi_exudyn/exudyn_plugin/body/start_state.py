@@ -1,4 +1,4 @@
-"""Start state: what a body takes from the system as it stands at the start of a run."""
+"""Start state of a body in a run, from the present state of the Exudyn system."""
 
 from __future__ import annotations
 
@@ -15,48 +15,52 @@ from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 __all__ = ["start_state"]
 
 
-class StartingBody(Protocol):
-    """What is needed of a body."""
+class StartedBody(Protocol):
+    """Attributes of a body that its start state needs."""
 
     coordinates: Coordinates
 
     def stepped_level(self, states: tuple[int, ...]) -> SteppedLevel:
-        """The level of elements in these states as the solver has it."""
+        """The solver's level in which the elements are in these states."""
 
     def force_vector(self, stepped: SteppedLevel) -> np.ndarray:
-        """Constant force (s,) of the object in a level, at the present time."""
+        """Force vector (s,) of the object in a level, at the present time."""
 
 
 def start_state(
-    body: StartingBody, own: OwnLoads, mbs: Any, time: float, step: float, alone: bool, fresh: bool
+    body: StartedBody, own_loads: OwnLoads, mbs: Any, time: float, step: float, isolated: bool, as_created: bool
 ) -> State:
-    """The state at a time [s], where a run begins in steps of this length [s], under ``own`` loads.
+    """The state at the start of a run at ``time`` [s], with steps of this length [s]; writes its accelerations.
 
-    The system gets the accelerations that belong to it. alone: whether nothing else acts on the body. fresh: whether it
-    starts as it was made: only now the force is known, which the velocity of matched modes contains.
+    isolated: whether nothing but its own loads acts on the body. as_created: whether it starts as it was created; the
+    velocity of matched modes depends on the force, which is known only now.
     """
-    here = body.coordinates
-    stepped, (q, q_t, q_tt) = here.stepped, here.views
-    states, entered, held = here.stored()
-    if states != stepped.states or not np.array_equal(held, here.held):  # accelerations are of stale matrices
-        here.held, stepped = held, body.stepped_level(states)
-        here.enter(mbs, stepped, body.force_vector(stepped))
-        if not alone:
-            q_tt[:] = stepped.acceleration(q, q_t, _acting(here, mbs, step)[: stepped.size])
-    force = own.forces(states, np.array([time]))[0] if alone else here.force(here.read())[: stepped.size]
-    if fresh:
+    coordinates = body.coordinates
+    stepped, (q, q_t, q_tt) = coordinates.stepped, coordinates.views
+    states, phases, held = coordinates.read_level_data()
+    if states != stepped.states or not np.array_equal(held, coordinates.held):  # accelerations belong to other matrices
+        coordinates.held, stepped = held, body.stepped_level(states)
+        coordinates.set_level_in_run(mbs, stepped, body.force_vector(stepped))
+        if not isolated:
+            q_tt[:] = stepped.acceleration(q, q_t, _external_force(coordinates, mbs, step)[: stepped.size])
+    force = (
+        own_loads.forces(states, np.array([time]))[0]
+        if isolated
+        else coordinates.external_force(coordinates.copy_state())[: stepped.size]
+    )
+    if as_created:
         q_t += stepped.from_force @ force
-    if fresh or alone:
+    if as_created or isolated:
         q_tt[:] = stepped.acceleration(q, q_t, force)
-    here.write(stepped, held, here.views)
+    coordinates.write(stepped, held, coordinates.views)
     r, eta_t = stepped.modes, stepped.velocity(q, q_t, force)
     xi, xi_t = np.concatenate([q[:r], held]), np.concatenate([eta_t[:r], 0 * held])
-    state = State(own.levels.level(states), xi, xi_t, entered)
-    return replace(state, phases=own.phases_of(state, time))
+    state = State(own_loads.static_levels.level(states), xi, xi_t, phases)
+    return replace(state, phases=own_loads.phases_of(state, time))
 
 
-def _acting(here: Coordinates, mbs: Any, step: float) -> np.ndarray:
-    """(p, f) in the present state of the system, with what constraints and inertia make of it on an interface."""
-    if here.surroundings is None:
-        return here.applied(mbs)
-    return here.seen(here.surroundings.accelerations(step)).acting
+def _external_force(coordinates: Coordinates, mbs: Any, step: float) -> np.ndarray:
+    """External forces (p, f) in the present state of the system, those of constraints and attached masses included."""
+    if coordinates.system is None:
+        return coordinates.external_modal_force(mbs)
+    return coordinates.forces_from_accelerations(coordinates.system.accelerations(step)).forces

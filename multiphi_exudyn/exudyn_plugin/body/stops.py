@@ -1,12 +1,12 @@
-"""Stops: what Exudyn is told of a known motion, and at the ends of which steps.
+"""Event steps: the steps at whose ends the states of a known motion are written into the Exudyn system.
 
-A stop is the end of a step in which something changes: an event, or a contact that is refused. Of a body whose loads
-vary it is the end of every step. It is planned for steps of equal length, h, from the end of a step at t on:
+These are the steps in which the level or a phase changes: by an event, or by a request that is refused. With loads that
+vary, every step is one of them. They are planned for steps of equal length h from the end of a step at t on,
 
     t_k = t + k h,   k = 0, 1, ...
 
-with the exact state at t_k, and with the one that Exudyn's own steps make of the last stop, if nobody disturbs them.
-Behind the stops the last of these steps is planned too, at which nothing is written.
+Each has the exact state at t_k, and the coordinates that Exudyn's own steps reach there from the last event step if
+nothing else changes them. The last step of the plan is added even if nothing is to be written at its end.
 """
 
 from __future__ import annotations
@@ -19,42 +19,43 @@ from typing import Any, Protocol
 import numpy as np
 
 from multiphi_exudyn.exudyn_plugin.body.coordinates import Coordinates
-from multiphi_exudyn.exudyn_plugin.body.known_motion import Stretch
+from multiphi_exudyn.exudyn_plugin.body.known_motion import MotionInterval
 from multiphi_exudyn.exudyn_plugin.body.own_loads import OwnLoads
 from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedSteps
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.levels.model import MultiPhiModel
 
-__all__ = ["Departure", "KnownBody", "StepsOf", "Stops", "stops_of", "swings"]
+__all__ = ["EventSteps", "IsolatedBody", "PlanStart", "StepsOf", "amplitudes", "plan_event_steps"]
 
-SAME_PLACE = 1e-9  # of a step: a change so close behind the end of one may be rounding of the times
+TIME_ROUNDING = 1e-9  # of a step: a change this little after the end of a step is counted in it
 
 StepsOf = Callable[[SteppedLevel], UndisturbedSteps]
 
 
-class KnownBody(Protocol):
-    """What is needed of a body."""
+class IsolatedBody(Protocol):
+    """Attributes of a body that the plan of its event steps needs."""
 
     name: str
     model: MultiPhiModel
     items: dict[str, Any]
     coordinates: Coordinates
     matched_step: float | None
-    own: OwnLoads
+    own_loads: OwnLoads
 
     @property
     def varies(self) -> bool:
         """Whether its loads vary in time."""
 
     def stepped_level(self, states: tuple[int, ...]) -> SteppedLevel:
-        """The level of elements in these states as the solver has it."""
+        """The solver's level in which the elements are in these states."""
 
 
 @dataclass(frozen=True)
-class Departure:
+class PlanStart:
     """The end of a step at ``time`` [s], the ``index``-th of the run, from which steps of length ``step`` [s] follow.
 
-    level, state: as Exudyn has them there, (q, q', q'') (3, s). done: how many changes of the stretch are behind it.
+    level, state: those of the Exudyn system there, state (q, q', q'') (3, s). changes_passed: number of changes in the
+    interval of the motion up to this time.
     """
 
     time: float
@@ -62,22 +63,23 @@ class Departure:
     step: float
     level: SteppedLevel
     state: np.ndarray
-    done: int
+    changes_passed: int
 
 
 @dataclass(frozen=True)
-class Stops:
-    """n stops, and maybe the last step behind them, k = n or n + 1 in all.
+class EventSteps:
+    """n event steps, and the last step of the plan where it is none of them: k = n or n + 1 steps.
 
-    times: [s]; due: a step that ends at this time [s] or later is the one. indices: of these steps. done: how many
-    changes of the stretch are then behind. expected (k, s): q that Exudyn has before, largest (k,): how far the modes
-    have gone so far. levels, states (n, 3, s): what is written; data (n, width): what goes into the data node.
+    times: ends of the steps [s]. due_times [s]: the first step that ends at such a time or later is the event step.
+    indices: of the steps in the run. changes_passed: number of changes in the interval up to there. expected (k, s): q
+    before anything is written. largest (k,): largest amplitude of the modes so far. levels, states (n, 3, s): to be
+    written; data (n, width): for the data node.
     """
 
     times: list[float]
-    due: list[float]
+    due_times: list[float]
     indices: list[int]
-    done: list[int]
+    changes_passed: list[int]
     levels: list[SteppedLevel]
     states: np.ndarray
     data: np.ndarray
@@ -85,43 +87,50 @@ class Stops:
     largest: list[float]
 
 
-def stops_of(
-    body: KnownBody, stretch: Stretch, start: Departure, steps_of: StepsOf, most: int, missed: bool = False
-) -> Stops:
-    """The stops within a stretch among the next ``most`` ends of steps, the one at the departure included.
+def plan_event_steps(
+    body: IsolatedBody, interval: MotionInterval, start: PlanStart, steps_of: StepsOf, count: int, missed: bool = False
+) -> EventSteps:
+    """Plan the event steps within an interval, among the next ``count`` ends of steps, that at the start included.
 
-    missed: that one is a stop, whatever comes.
+    missed: whether a change has been missed, which makes the start itself an event step.
     """
-    last = min(most - 1, math.floor((stretch.end - start.time) / start.step + SAME_PLACE))
-    coming = stretch.changes[start.done :]
-    places = np.ceil((coming - start.time) / start.step - SAME_PLACE)
-    places = np.maximum(places + (start.time + start.step * places < coming), 0).astype(int)
-    coming, places = coming[places <= last], places[places <= last]
-    every = np.arange(last + 1) if body.varies else places if not missed else np.append(0, places)
-    first = np.flatnonzero(every > np.append(-1, every)[:-1])
-    stops = every[first]
-    times = start.time + start.step * stops
-    if stretch.failure:
-        known = times < stretch.end
-        stops, first, times = stops[known], first[known], times[known]
-    due = times - SAME_PLACE * start.step
+    last = min(count - 1, math.floor((interval.end - start.time) / start.step + TIME_ROUNDING))
+    change_times = interval.change_times[start.changes_passed :]
+    change_steps = np.ceil((change_times - start.time) / start.step - TIME_ROUNDING)
+    change_steps = np.maximum(change_steps + (start.time + start.step * change_steps < change_times), 0).astype(int)
+    change_times, change_steps = change_times[change_steps <= last], change_steps[change_steps <= last]
+    candidates = np.arange(last + 1) if body.varies else change_steps if not missed else np.append(0, change_steps)
+    first = np.flatnonzero(candidates > np.append(-1, candidates)[:-1])
+    steps = candidates[first]
+    times = start.time + start.step * steps
+    if interval.failure:
+        before_failure = times < interval.end
+        steps, first, times = steps[before_failure], first[before_failure], times[before_failure]
+    due_times = times - TIME_ROUNDING * start.step
     if not (body.varies or missed):
-        due = np.minimum(due, coming[first])
-    levels, numbers, states, data = _states(body, stretch, times, start.level)
-    if last > (stops[-1] if len(stops) else 0) and not stretch.failure:
-        stops, until = np.append(stops, last), start.time + start.step * last
-        times, due = np.append(times, until), np.append(due, until - SAME_PLACE * start.step)
-    done = start.done + np.searchsorted(places, stops, side="right")
-    expected, reached = _expected(start, stops, levels, numbers, states, steps_of)
-    largest = np.maximum.accumulate(reached).tolist()
-    given = times.tolist(), due.tolist(), (start.index + stops).tolist(), done.tolist()
-    return Stops(*given, [levels[number] for number in numbers.tolist()], states, data, expected, largest)
+        due_times = np.minimum(due_times, change_times[first])
+    levels, level_numbers, states, data = _states(body, interval, times, start.level)
+    if last > (steps[-1] if len(steps) else 0) and not interval.failure:
+        steps, end = np.append(steps, last), start.time + start.step * last
+        times, due_times = np.append(times, end), np.append(due_times, end - TIME_ROUNDING * start.step)
+    expected, largest = _undisturbed(start, steps, levels, level_numbers, states, steps_of)
+    return EventSteps(
+        times=times.tolist(),
+        due_times=due_times.tolist(),
+        indices=(start.index + steps).tolist(),
+        changes_passed=(start.changes_passed + np.searchsorted(change_steps, steps, side="right")).tolist(),
+        levels=[levels[number] for number in level_numbers.tolist()],
+        states=states,
+        data=data,
+        expected=expected,
+        largest=np.maximum.accumulate(largest).tolist(),
+    )
 
 
-def swings(states: np.ndarray, periods: np.ndarray) -> np.ndarray:
-    """How far the modes go (k,) from states (q, q', q'') (k, 3, s): the largest of |q| and |q'| / omega.
+def amplitudes(states: np.ndarray, periods: np.ndarray) -> np.ndarray:
+    """Largest amplitude (k,) of any mode that moves freely from (q, q', q'') (k, 3, s): max of |q| and |q'| / omega.
 
-    periods: 1 / omega (s,) [s] or (k, s), zero of those that are free.
+    periods: 1 / omega (s,) [s] or (k, s), zero for modes of zero frequency.
     """
     return np.asarray(np.maximum(_largest(states[:, 0]), _largest(states[:, 1] * periods)))
 
@@ -131,44 +140,45 @@ def _largest(rows: np.ndarray) -> np.ndarray:
 
 
 def _states(
-    body: KnownBody, stretch: Stretch, times: np.ndarray, first: SteppedLevel
+    body: IsolatedBody, interval: MotionInterval, times: np.ndarray, first: SteppedLevel
 ) -> tuple[list[SteppedLevel], np.ndarray, np.ndarray, np.ndarray]:
-    """Levels, the ``first`` at their head; at times (n,) [s] which of them holds, states (n, 3, s), data (n, width).
+    """Levels, beginning with ``first``; at times (n,) [s] the number of the level, states (n, 3, s), data (n, width).
 
-    The phases are those with which the level was entered.
+    The phases in the data are those with which the level was entered.
     """
     layout, count, levels = body.coordinates.layout, len(times), [first]
     numbers, states, data = np.zeros(count, int), np.empty((count, 3, first.size)), np.zeros((count, layout.width))
-    for moments in stretch.at(times) if count else ():
-        places, own = moments.places, moments.level.states
-        stepped, forces = body.stepped_level(own), body.own.forces(own, times[places])
-        states[places] = stepped.shown(moments.displacement, moments.velocity, forces).reshape(len(places), 3, -1)
-        data[places] = layout.rows(own, moments.phases, moments.displacement[:, stepped.modes :])
-        if own != first.states:
-            numbers[places] = len(levels)
+    for part in interval.at(times) if count else ():
+        rows, element_states = part.indices, part.level.states
+        stepped, forces = body.stepped_level(element_states), body.own_loads.forces(element_states, times[rows])
+        states[rows] = stepped.solver_states(part.displacement, part.velocity, forces).reshape(len(rows), 3, -1)
+        data[rows] = layout.rows(element_states, part.phases, part.displacement[:, stepped.modes :])
+        if element_states != first.states:
+            numbers[rows] = len(levels)
             levels.append(stepped)
     return levels, numbers, states, data
 
 
-def _expected(
-    start: Departure,
-    stops: np.ndarray,
+def _undisturbed(
+    start: PlanStart,
+    steps: np.ndarray,
     levels: list[SteppedLevel],
-    numbers: np.ndarray,
+    level_numbers: np.ndarray,
     states: np.ndarray,
     steps_of: StepsOf,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """q (n, s) that undisturbed steps make of the state at the departure and at every stop up to the next one.
+    """q (n, s) before each event step, by undisturbed steps from the start or from the event step before it.
 
-    Beside it how far the modes go on that way (n,).
+    The second array holds the largest amplitude (n,) of the modes on the way.
     """
-    count, counts = len(stops), np.diff(stops, prepend=0)
-    before, given = np.concatenate([start.state[None], states])[:count], np.append(0, numbers)[:count]
-    found, periods = np.empty((2, count, start.level.size))
+    count, counts = len(steps), np.diff(steps, prepend=0)
+    before = np.concatenate([start.state[None], states])[:count]
+    numbers_before = np.append(0, level_numbers)[:count]
+    q, periods = np.empty((2, count, start.level.size))
     for number, stepped in enumerate(levels):
-        here = np.flatnonzero(given == number)
-        if len(here):
-            steps = steps_of(stepped)
-            found[here] = steps.after(before[here], counts[here])[:, 0]
-            periods[here] = steps.periods
-    return found, np.maximum(swings(before, periods), _largest(found))
+        rows = np.flatnonzero(numbers_before == number)
+        if len(rows):
+            undisturbed = steps_of(stepped)
+            q[rows] = undisturbed.after(before[rows], counts[rows])[:, 0]
+            periods[rows] = undisturbed.periods
+    return q, np.maximum(amplitudes(before, periods), _largest(q))

@@ -1,10 +1,10 @@
-"""Surroundings: what the system does to a body at an event in a step, and what the event does to the system.
+"""Surroundings: forces of the system on a body at an event within a step, and effects of the event on the system.
 
-    (p, f) right after an event = those held before it + what changes in the system between the states before and after
+    (p, f) right after an event = (p, f) before it + change of the system's forces from the state before to that after
 
-p (s,) acts on the coordinates of the body, f (m,) on its points. Where only connectors and loads act there, they are
-read off the system's forces. Where masses or constraints hang on the points, the accelerations of the whole system are
-solved for, and reactions of rigid contacts are followed by forces on the points (attached_inertia.py).
+p (s,) acts on the coordinates of the body, f (m,) on its points. With connectors and loads alone, the change is read
+from the system's forces. With masses or constraints attached to the points, the accelerations of the whole system are
+computed, and reactions of rigid contacts cause forces on the points (attached_inertia.py).
 """
 
 from __future__ import annotations
@@ -20,184 +20,190 @@ from multiphi_exudyn.events.state import State
 from multiphi_exudyn.exudyn_plugin.body.coordinates import Coordinates
 from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import PointInertia, Reactions
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.exudyn_plugin.coupling.system_matrices import Hanging, SystemMatrices
+from multiphi_exudyn.exudyn_plugin.coupling.system_matrices import AttachedParts, SystemMatrices
 
-__all__ = ["BodyAmongOthers", "Instant", "Surroundings", "surroundings_of"]
+__all__ = ["CoupledBody", "Instant", "Surroundings", "surroundings_of"]
 
 
-class BodyAmongOthers(Protocol):
-    """What is needed of a body."""
+class CoupledBody(Protocol):
+    """Attributes of a body that its surroundings need."""
 
     coordinates: Coordinates
 
     def stepped_level(self, states: tuple[int, ...]) -> SteppedLevel:
-        """The level of elements in these states as the solver has it."""
+        """The solver's level in which the elements are in these states."""
 
-    def own_force(self, states: tuple[int, ...], time: float) -> np.ndarray:
-        """(p, f) of its own varying loads at a time [s], in a level."""
+    def varying_load_force(self, states: tuple[int, ...], time: float) -> np.ndarray:
+        """Force (p, f) of the body's own varying loads at a time [s], in a level."""
 
 
 @dataclass(frozen=True)
 class Instant:
-    """Of the first event in a step of length ``step`` that ends at ``end``: its time [s], the states right
-    before and right after."""
+    """Time [s] of the first event in a step of length ``step`` [s], and the states right before and right after it."""
 
     time: float
-    end: float
+    step_end: float
     step: float
-    before: State
-    after: State
+    state_before: State
+    state_after: State
 
     @property
     def elapsed(self) -> float:
         """Time [s] from the event to the end of the step."""
-        return self.end - self.time
+        return self.step_end - self.time
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The system around a body at the end of a step, as it is without an event in it.
+    """The system around a body at the end of a step, in the state that the step without an event gives.
 
-    unmoved: q, v (2, n). hanging: what hangs on the points; inertia: the same for the body's levels, None where nothing
-    hangs there. reactions: forces that follow those of rigid contacts. All None without an interface.
+    undisturbed: q, v (2, n) of the system in that state. parts: attached to the points; inertia: of the parts, for the
+    body's levels, None where nothing is attached. reactions: forces on the points that reactions of rigid contacts
+    cause. All are None without an interface.
     """
 
-    body: BodyAmongOthers
+    body: CoupledBody
     system: SystemMatrices | None
-    unmoved: np.ndarray
-    hanging: Hanging | None
+    undisturbed: np.ndarray
+    parts: AttachedParts | None
     inertia: PointInertia | None
     reactions: Reactions | None
 
-    def told(self, force: np.ndarray, given: SteppedLevel, states: tuple[int, ...]) -> np.ndarray:
-        """(p, f) of one level in another, with the forces that follow from those of other elements."""
-        if states == given.states:
+    def force_in_level(self, force: np.ndarray, source: SteppedLevel, states: tuple[int, ...]) -> np.ndarray:
+        """Force (p, f) of the level ``source`` in another one, with the change of the forces that reactions cause."""
+        if states == source.states:
             return force
-        here, wanted = self.body.coordinates, self.body.stepped_level(states)
-        carried = here.carried(force, given, wanted)
-        if self.reactions is None or here.interface is None:
-            return carried
-        change = self.reactions.at(wanted.loaded) - self.reactions.at(given.loaded)
-        return carried + np.concatenate([change @ here.interface.of(wanted).rows, change])
+        coordinates, target = self.body.coordinates, self.body.stepped_level(states)
+        transformed = coordinates.transform_force(force, source, target)
+        if self.reactions is None or coordinates.interface is None:
+            return transformed
+        change = self.reactions.at(target.loaded) - self.reactions.at(source.loaded)
+        return transformed + np.concatenate([change @ coordinates.interface.map_in(target).rows, change])
 
-    def changed_by(self, mbs: Any, instant: Instant, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(p, f) right after an event, from ``force`` before it, and what it changes in the system.
+    def force_after_event(self, mbs: Any, instant: Instant, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Force (p, f) right after an event, from ``force`` right before it, and the change (n,) in the system.
 
-        That is of accelerations (n,) where something hangs on the points, else of forces (n,).
+        The change is one of accelerations where something is attached to the points, else one of forces.
         """
-        body, here, after = self.body, self.body.coordinates, instant.after
-        own, entered = here.stepped, body.stepped_level(after.states)
-        given, there = body.own_force(own.states, instant.end), body.own_force(after.states, instant.end)
-        before = instant.before
-        here.write(own, before.held, own.state(before.displacement, before.velocity, (force + given)[: own.size]))
-        shown = entered.state(
-            after.displacement, after.velocity, (self.told(force, own, after.states) + there)[: own.size]
-        )
-        if self.inertia is None or self.system is None or self.hanging is None:
-            felt = here.felt(mbs, own)
-            here.write(entered, after.held, shown)
-            changed = here.felt(mbs, entered)
+        body, coordinates, system = self.body, self.body.coordinates, self.system
+        before, after = instant.state_before, instant.state_after
+        old, new = coordinates.stepped, body.stepped_level(after.states)
+        own_before = body.varying_load_force(old.states, instant.step_end)
+        own_after = body.varying_load_force(after.states, instant.step_end)
+        modal_before = (force + own_before)[: old.size]
+        coordinates.write(old, before.held, old.solver_state(before.displacement, before.velocity, modal_before))
+        modal_after = (self.force_in_level(force, old, after.states) + own_after)[: old.size]
+        entered = new.solver_state(after.displacement, after.velocity, modal_after)
+        if self.inertia is None or system is None or self.parts is None:
+            forces_before = coordinates.external_forces(mbs, old)
+            coordinates.write(new, after.held, entered)
+            forces_after = coordinates.external_forces(mbs, new)
         else:
-            left, felt = self.system.present(), here.seen(self.system.accelerations(instant.step))
-            here.enter_with(mbs, entered, after.held, entered.drive)
-            here.write(entered, after.held, shown)
-            self.system.follow(self.hanging, left)
-            changed = here.seen(self.system.accelerations(instant.step))
-        return changed.acting + here.carried(force - felt.acting, own, entered), changed.whole - felt.whole
+            state_before = system.copy_state()
+            forces_before = coordinates.forces_from_accelerations(system.accelerations(instant.step))
+            coordinates.set_level_if_changed(mbs, new, after.held, new.drive)
+            coordinates.write(new, after.held, entered)
+            system.move_parts(self.parts, state_before)
+            forces_after = coordinates.forces_from_accelerations(system.accelerations(instant.step))
+        remainder = coordinates.transform_force(force - forces_before.forces, old, new)
+        return forces_after.forces + remainder, forces_after.system_values - forces_before.system_values
 
     def at_event(self, instant: Instant, force: np.ndarray) -> Surroundings:
-        """The same with what hung on the points at the event: joints may have turned since. force: (p, f) before it."""
-        here = self.body.coordinates
-        if self.system is None or self.inertia is None or not here.foreseen:
+        """The surroundings at the event, where joints may have had other angles; force: (p, f) right before it."""
+        coordinates = self.body.coordinates
+        if self.system is None or self.inertia is None or not coordinates.depends_on_later_forces:
             return self
-        hanging = self.system.hanging(self.unmoved, here.stepped.mass, instant.elapsed)
-        found = replace(self, hanging=hanging, inertia=_inertia(self.body, hanging))
-        return found.deciding(instant.before, force)
+        parts = self.system.attached_parts(self.undisturbed, coordinates.stepped.mass, instant.elapsed)
+        at_event = replace(self, parts=parts, inertia=_point_inertia(self.body, parts))
+        return at_event.with_reactions_at(instant.state_before, force)
 
-    def deciding(self, state: State, force: np.ndarray) -> Surroundings:
-        """The same with the forces that go with others in another level right after a state, in which (p, f) acts.
+    def with_reactions_at(self, state: State, force: np.ndarray) -> Surroundings:
+        """The surroundings with the reactions that follow from a state in which (p, f) acts.
 
-        Stick and slip exclude each other only if they are told from one acceleration.
+        Only with one acceleration for both decisions do stick and slip exclude each other.
         """
-        if self.hanging is None or self.inertia is None or not self.body.coordinates.slips:
+        if self.parts is None or self.inertia is None or not self.body.coordinates.has_friction:
             return self
-        own, r, s = state.level.modal, state.level.modal.modes, self.body.coordinates.stepped.size
+        level, r, s = state.level.modal, state.level.modal.modes, self.body.coordinates.stepped.size
         x, v = state.displacement, state.velocity
         eta_tt = state.level.alone.asymptotic.drive + force[:r]
-        eta_tt -= own.damping_matrix @ v[:r] + own.squares * x[:r] + own.coupling @ x[:r]
-        reactions = _reactions_of(self.body, self.hanging, state.level, (x, v, eta_tt), force[s:])
+        eta_tt -= level.damping_matrix @ v[:r] + level.squares * x[:r] + level.coupling @ x[:r]
+        reactions = _reactions_of(self.body, self.parts, state.level, (x, v, eta_tt), force[s:])
         return replace(self, reactions=reactions)
 
-    def settled(self, mbs: Any, instant: Instant, change: np.ndarray) -> np.ndarray:
-        """(p, f) at the end of the step, where all has followed the body since the event; change: what it changed."""
-        here, system = self.body.coordinates, self.system
+    def force_at_step_end(self, mbs: Any, instant: Instant, change: np.ndarray) -> np.ndarray:
+        """Force (p, f) at the end of the step, after the system has followed the body since the event.
+
+        change: of accelerations or forces (n,) at the event, from ``force_after_event``.
+        """
+        coordinates, system = self.body.coordinates, self.system
         assert system is not None
-        assert self.hanging is not None
+        assert self.parts is not None
         if self.inertia is None:
-            system.spread(self.hanging, instant.step, instant.elapsed, change)
-            felt = here.felt(mbs, here.stepped)
-            here.put_forces(felt.acting[here.stepped.size :])
-            return felt.acting
-        q, v = self.unmoved
-        system.follow(self.hanging, np.array([q, v + instant.elapsed * change]))
-        return here.seen(system.accelerations(instant.step)).acting
+            system.apply_force_jump(self.parts, instant.step, instant.elapsed, change)
+            external = coordinates.external_forces(mbs, coordinates.stepped)
+            coordinates.set_tie_forces(external.forces[coordinates.stepped.size :])
+            return external.forces
+        q, v = self.undisturbed
+        system.move_parts(self.parts, np.array([q, v + instant.elapsed * change]))
+        return coordinates.forces_from_accelerations(system.accelerations(instant.step)).forces
 
-    def kinetic(self, state: State) -> float:
-        """Kinetic energy [J] of the body and of what its points carry."""
-        if self.hanging is None or self.inertia is None:
+    def kinetic_energy(self, state: State) -> float:
+        """Kinetic energy [J] of the body and of the parts attached to its points."""
+        if self.parts is None or self.inertia is None:
             return state.kinetic
-        speeds = _rows_in(self.body, state.states) @ state.velocity[: state.level.modal.modes]
-        return state.kinetic + 0.5 * float(speeds @ self.hanging.attached.mass @ speeds)
+        speeds = _point_rows(self.body, state.states) @ state.velocity[: state.level.modal.modes]
+        return state.kinetic + 0.5 * float(speeds @ self.parts.inertia.mass @ speeds)
 
 
-def surroundings_of(body: BodyAmongOthers, x: np.ndarray) -> Surroundings:
-    """What the system is around a body in its present state, of which x is a copy."""
-    here = body.coordinates
-    system = here.surroundings
-    if here.interface is None or system is None:
+def surroundings_of(body: CoupledBody, x: np.ndarray) -> Surroundings:
+    """Surroundings of a body in the present state of the system; x: a copy of the body's part of that state."""
+    coordinates = body.coordinates
+    system = coordinates.system
+    if coordinates.interface is None or system is None:
         return Surroundings(body, None, np.zeros((2, 0)), None, None, None)
-    unmoved = system.present()
-    hanging = system.hanging(unmoved, here.stepped.mass)
-    inertia = _inertia(body, hanging)
-    if inertia is None or not here.foreseen:
-        return Surroundings(body, system, unmoved, hanging, inertia, None)
-    physical = here.stepped.physical @ np.concatenate(here.split(x))
-    eta, eta_t, eta_tt = (part[: here.stepped.modes] for part in np.split(physical, 3))
-    motion = np.concatenate([eta, here.held]), np.concatenate([eta_t, 0 * here.held]), eta_tt
-    reactions = _reactions_of(body, hanging, here.stepped.loaded, motion, here.interface.forces)
-    return Surroundings(body, system, unmoved, hanging, inertia, reactions)
+    undisturbed = system.copy_state()
+    parts = system.attached_parts(undisturbed, coordinates.stepped.mass)
+    inertia = _point_inertia(body, parts)
+    if inertia is None or not coordinates.depends_on_later_forces:
+        return Surroundings(body, system, undisturbed, parts, inertia, None)
+    physical = coordinates.stepped.to_physical @ np.concatenate(coordinates.split(x))
+    eta, eta_t, eta_tt = (part[: coordinates.stepped.modes] for part in np.split(physical, 3))
+    motion = np.concatenate([eta, coordinates.held]), np.concatenate([eta_t, 0 * coordinates.held]), eta_tt
+    reactions = _reactions_of(body, parts, coordinates.stepped.loaded, motion, coordinates.interface.forces)
+    return Surroundings(body, system, undisturbed, parts, inertia, reactions)
 
 
 def _reactions_of(
-    body: BodyAmongOthers, hanging: Hanging, loaded: LoadedLevel, motion: Sequence[np.ndarray], points: np.ndarray
+    body: CoupledBody, parts: AttachedParts, loaded: LoadedLevel, motion: Sequence[np.ndarray], points: np.ndarray
 ) -> Reactions:
-    """Forces that follow those of elements; motion: xi, xi', eta'' in a level; points: f (m,)."""
-    (x, v, eta_tt), level, here = motion, loaded.level, body.coordinates
-    assert here.interface is not None
-    carried = loaded.asymptotic.forces + here.direct(body.stepped_level(loaded.states)) @ points
-    pushed = carried + level.force_rows @ x + level.force_rate_rows @ v
-    rows = here.interface.in_base(level.base)
+    """Forces on points caused by those of elements; motion: xi, xi', eta'' in a level; points: f (m,)."""
+    (x, v, eta_tt), level, coordinates = motion, loaded.level, body.coordinates
+    assert coordinates.interface is not None
+    constant = loaded.asymptotic.forces + coordinates.direct_reactions(body.stepped_level(loaded.states)) @ points
+    link_forces = constant + level.force_rows @ x + level.force_rate_rows @ v
+    rows = coordinates.interface.in_base(level.base)
     acceleration = loaded.modal.vectors @ eta_tt
-    return Reactions(hanging.attached, level.base, rows, acceleration, loaded, pushed, _pressures(loaded, x, v))
+    return Reactions(parts.inertia, level.base, rows, acceleration, loaded, link_forces, _spring_forces(loaded, x, v))
 
 
-def _pressures(loaded: LoadedLevel, x: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """-k q - c q' (l,) [N] of all links with a finite stiffness, whether they hold or not."""
-    base, own = loaded.level.base, loaded.level
+def _spring_forces(loaded: LoadedLevel, x: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Forces -k q - c q' (l,) [N] of all links of finite stiffness, whether they act or not."""
+    base, level = loaded.level.base, loaded.level
     springs = np.where(np.isinf(base.stiffnesses), 0.0, base.stiffnesses)
-    return np.asarray(-springs * (own.gap_rows @ x + loaded.gap_constants) - base.dampings * (own.gap_rows @ v))
+    return np.asarray(-springs * (level.gap_rows @ x + loaded.gap_constants) - base.dampings * (level.gap_rows @ v))
 
 
-def _inertia(body: BodyAmongOthers, hanging: Hanging) -> PointInertia | None:
+def _point_inertia(body: CoupledBody, parts: AttachedParts) -> PointInertia | None:
     interface = body.coordinates.interface
-    if hanging.only_forces or interface is None:
+    if parts.only_forces or interface is None:
         return None
     base = body.coordinates.stepped.loaded.level.base
-    return PointInertia(hanging.attached, base, interface.in_base(base), lambda states: _rows_in(body, states))
+    return PointInertia(parts.inertia, base, interface.in_base(base), lambda states: _point_rows(body, states))
 
 
-def _rows_in(body: BodyAmongOthers, states: tuple[int, ...]) -> np.ndarray:
-    """R (m, r) in a level."""
+def _point_rows(body: CoupledBody, states: tuple[int, ...]) -> np.ndarray:
+    """Rows R (m, r) of the points in the modes of a level."""
     stepped, interface = body.stepped_level(states), body.coordinates.interface
     assert interface is not None
-    return interface.of(stepped).rows[:, : stepped.modes]
+    return interface.map_in(stepped).rows[:, : stepped.modes]

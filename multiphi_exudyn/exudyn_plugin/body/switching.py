@@ -1,11 +1,10 @@
-"""Switching: the one function Exudyn calls after every step, for all Multi-Phi bodies of a system.
+"""Switching: the PostStep user function of a system, which handles the events of all its Multi-Phi bodies.
 
-Exudyn has a single place for such a function. Bodies share it, and what the user had installed before the first
-body is called after them, with the coordinates and levels as the bodies left them. A function installed later
-replaces this one; a run that ends without it is found out (``check_called``).
+Exudyn has one such function per system. All bodies share it. A function that the user installed before the first body
+is called after the bodies, with the coordinates and levels that they have written. A function that is installed later
+replaces this one; ``check_called`` detects a run that ends without it.
 
-As long as every body knows when it has something to do next, the function compares the time with the first of these
-times, and does nothing else.
+While every body knows the time of its next action, the function only compares the present time with the earliest one.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ import exudyn as exu
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, MultiPhiWarning
 
-__all__ = ["BODIES", "Switching", "SwitchingBody", "bodies_of", "check_solver", "nothing_acts_on", "running_solver"]
+__all__ = ["BODIES", "Switching", "SwitchingBody", "bodies_of", "check_solver", "is_isolated", "running_solver"]
 
 BODIES = "multiPhi"  # key in mbs.variables
 
@@ -28,18 +27,18 @@ StepFunction = Callable[[Any, float], bool]
 
 
 class SwitchingBody(Protocol):
-    """What switching needs of a body: what it is called, and what is called on it around every step."""
+    """Attributes of a body, and its functions that are called before and after steps."""
 
     name: str
     items: dict[str, Any]
 
     @property
     def next_time(self) -> float:
-        """When [s] it has something to do next, -inf where that is at the end of every step."""
+        """Time [s] of its next action, -inf for an action at the end of every step."""
 
     @property
-    def clear(self) -> Callable[[float], int] | None:
-        """Says at the end of a step, by its time [s], whether nothing is to do; None where ``next_time`` says it."""
+    def is_step_clear(self) -> Callable[[float], int] | None:
+        """Function of the end of a step [s], nonzero if the body needs no action; None where ``next_time`` decides."""
 
     @property
     def rigid(self) -> bool:
@@ -47,127 +46,133 @@ class SwitchingBody(Protocol):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to distrust in the run that ends, a sentence each."""
+        """Warnings about the accuracy of the run, a sentence each."""
 
     def before_step(self, mbs: Any, t: float) -> None:
-        """What it does before a step that ends at t."""
+        """Act before a step that ends at t [s]."""
 
     def after_step(self, mbs: Any, t: float) -> None:
-        """What it does when a step is done, and at the start."""
+        """Act at the end of a step at t [s], and at the start of a run."""
 
-    def look_again(self) -> None:
+    def restart_step(self) -> None:
         """Take the present state as the start of the next step."""
 
 
 class Clock:
-    """The time of the last step [s], and when the bodies have something to do next; ``due`` is called then.
+    """Time of the last step [s], and time [s] of the next action of a body, at which ``switch`` is called.
 
-    clear: says at the end of a step before that, by its time [s], whether there is nothing to do, None for always.
+    is_step_clear: function of the end of a step [s] before that, zero if an action is needed; None if never.
 
-    A class of its own, for what it does is done after every step: attributes of a dict take twice the time.
+    A class of its own for speed, as it runs after every step: attributes of a dict would take twice the time.
     """
 
-    def __init__(self, due: StepFunction) -> None:
-        self.due = due
+    def __init__(self, switch: StepFunction) -> None:
+        self.switch = switch
         self.time = math.nan
         self.next_time = -math.inf
-        self.clear: Callable[[float], int] | None = None
+        self.is_step_clear: Callable[[float], int] | None = None
 
     def after_step(self, mbs: Any, t: float) -> bool:
-        """Called by Exudyn; whether the run goes on."""
-        if self.time < t < self.next_time and (self.clear is None or self.clear(t)):
+        """Handle the end of a step at t [s]; called by Exudyn, returns whether the run goes on."""
+        if self.time < t < self.next_time and (self.is_step_clear is None or self.is_step_clear(t)):
             self.time = t
             return True
-        return self.due(mbs, t)
+        return self.switch(mbs, t)
 
 
 class Switching(dict[str, SwitchingBody]):
     """Bodies of one system by name, and their common PreStep and PostStep user functions.
 
-    preceding, following: the user's own PreStep and PostStep functions, or None. needed: whether any body has to be
-    called. disturbed: whether an event of one body has just moved what hangs on it, maybe another. end: of the run [s],
-    infinite once its warnings are issued. clock: whose function is the PostStep one.
+    user_pre_step, user_post_step: the user's own functions, or None. is_required: whether a body needs these calls.
+    others_disturbed: whether an event has just changed what is attached to a body, which may be another body. end_time:
+    of the run [s], infinite once its warnings are issued. clock: has the function that is installed as PostStep.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self.preceding: StepFunction | None = None
-        self.following: StepFunction | None = None
-        self.needed = False
-        self.disturbed = False
-        self.end = math.inf
+        self.user_pre_step: StepFunction | None = None
+        self.user_post_step: StepFunction | None = None
+        self.is_required = False
+        self.others_disturbed = False
+        self.end_time = math.inf
         self.clock = Clock(self._switch)
 
     def add(self, body: SwitchingBody) -> None:
-        """Take a body in; those with rigid contacts come last, so that what they strike has had its own events."""
+        """Add a body; those with rigid contacts come last, after the events of the parts that they strike."""
         self[body.name] = body
         for other in [each for each in self.values() if each.rigid]:
             self[other.name] = self.pop(other.name)
 
     def before_step(self, mbs: Any, t: float) -> bool:
-        """Called by Exudyn; whether the run goes on."""
+        """Act before a step that ends at t [s]; called by Exudyn, returns whether the run goes on."""
         for body in self.values():
             body.before_step(mbs, t)
-        return self.preceding is None or self.preceding(mbs, t)
+        return self.user_pre_step is None or self.user_pre_step(mbs, t)
 
     def _switch(self, mbs: Any, t: float) -> bool:
-        """A step after which some body may have something to do, or the start of a run."""
+        """Handle a step after which a body may have to act, or the start of a run."""
         self.clock.time, self.clock.next_time = t, -math.inf
         for body in self.values():
             body.after_step(mbs, t)
-        if self.disturbed and len(self) > 1:  # whose event it was has looked
+        if self.others_disturbed and len(self) > 1:  # the body of the event is up to date
             for body in self.values():
-                body.look_again()
-        self.disturbed = False
-        if t >= self.end:
-            self.end = math.inf
+                body.restart_step()
+        self.others_disturbed = False
+        if t >= self.end_time:
+            self.end_time = math.inf
             self._warn()
-        elif self.following is None:
-            self.clock.next_time = min([self.end, *[body.next_time for body in self.values()]])
-            self.clock.clear = _all_of([clear for body in self.values() if (clear := body.clear) is not None])
-        return self.following is None or self.following(mbs, t)
+        elif self.user_post_step is None:
+            self.clock.next_time = min([self.end_time, *[body.next_time for body in self.values()]])
+            tests = [test for body in self.values() if (test := body.is_step_clear) is not None]
+            self.clock.is_step_clear = _combined_check(tests)
+        return self.user_post_step is None or self.user_post_step(mbs, t)
 
-    def begin(self) -> None:
-        """A run of a solver begins."""
-        self.clock.time, self.clock.next_time, self.clock.clear, self.end = math.nan, -math.inf, None, math.inf
+    def begin_run(self) -> None:
+        """Begin a run of a solver."""
+        self.clock.time, self.clock.next_time, self.clock.is_step_clear, self.end_time = (
+            math.nan,
+            -math.inf,
+            None,
+            math.inf,
+        )
 
     def check_called(self, t: float) -> None:
-        """Raises if a run has come to t [s] without the bodies: somebody else's PostStep function is installed."""
-        if self.needed and not self.clock.time >= t:
+        """Raise if a run has reached t [s] without calls of the bodies: another PostStep function is installed."""
+        if self.is_required and not self.clock.time >= t:
             raise MultiPhiValueError(
                 f"PostStepUserFunction: got a function that replaced the one of {next(iter(self))!r}, which handles "
                 "its events; need yours set before CreateMultiPhiBody, then both are called"
             )
 
     def _warn(self) -> None:
-        """Issue what the bodies have to say of the run that ends."""
+        """Issue the warnings of the bodies about the run."""
         for body in self.values():
             for sentence in body.warnings:
                 warnings.warn(f"{sentence} (body {body.name!r})", MultiPhiWarning, stacklevel=3)
 
     def install(self, mbs: Any) -> None:
-        """Become the system's PostStep function, followed by the present one."""
-        self.needed = True
+        """Install the PostStep function of the system, which then calls the present one."""
+        self.is_required = True
         present = _user_function("PostStep", mbs.GetPostStepUserFunction())
         if present != self.clock.after_step:
-            self.following = present
+            self.user_post_step = present
             mbs.SetPostStepUserFunction(self.clock.after_step)
 
-    def installed(self, mbs: Any) -> bool:
-        """Whether these bodies switch in a run of the system."""
+    def is_installed(self, mbs: Any) -> bool:
+        """Whether the PostStep function of these bodies is installed."""
         present = _user_function("PostStep", mbs.GetPostStepUserFunction())
         return present is not None and present == self.clock.after_step
 
-    def install_before(self, mbs: Any) -> None:
-        """Become the system's PreStep function, followed by the present one."""
+    def install_pre_step(self, mbs: Any) -> None:
+        """Install the PreStep function of the system, which then calls the present one."""
         present = _user_function("PreStep", mbs.GetPreStepUserFunction())
         if present != self.before_step:
-            self.preceding = present
+            self.user_pre_step = present
             mbs.SetPreStepUserFunction(self.before_step)
 
 
-def _all_of(tests: Sequence[Callable[[float], int]]) -> Callable[[float], int] | None:
-    """Whether all say so; those that have said so are not asked again for the same time."""
+def _combined_check(tests: Sequence[Callable[[float], int]]) -> Callable[[float], int] | None:
+    """One test for several bodies, nonzero if all are; one that passes has begun the next step and is not repeated."""
     if len(tests) < 2:
         return tests[0] if tests else None
     return lambda t: min(test(t) for test in tests)
@@ -186,19 +191,19 @@ def bodies_of(mbs: Any) -> Switching:
 
 
 def running_solver(mbs: Any, t: float) -> Any:
-    """The implicit dynamic solver at work at time t, None inside SolveStatic."""
+    """The implicit dynamic solver that is running at time t [s], None inside SolveStatic."""
     dynamic = mbs.sys.get("dynamicSolver")
-    if _at_work(dynamic, t):
+    if _is_running(dynamic, t):
         implicit = isinstance(dynamic, exu.MainSolverImplicitSecondOrder)
         check_solver(implicit, type(dynamic).__name__, bodies_of(mbs))
         return dynamic
-    if not _at_work(mbs.sys.get("staticSolver"), t):
+    if not _is_running(mbs.sys.get("staticSolver"), t):
         raise MultiPhiValueError("SolveDynamic: got a solver that is not stored, need storeSolver=True")
     return None
 
 
 def check_solver(implicit: bool, name: str, bodies: Mapping[str, Any]) -> None:
-    """Raises for a dynamic solver that has no implicit steps."""
+    """Raise for a dynamic solver that is not implicit."""
     if not implicit:
         raise MultiPhiValueError(
             f"solver: got {name}, which is explicit; need an implicit one for the Multi-Phi body "
@@ -206,24 +211,24 @@ def check_solver(implicit: bool, name: str, bodies: Mapping[str, Any]) -> None:
         )
 
 
-def nothing_acts_on(mbs: Any, node: Any, body: Any) -> bool:
-    """Whether no item of the system refers to a node or its body, and no user function could change them."""
+def is_isolated(mbs: Any, node: Any, body: Any) -> bool:
+    """Whether no item of the system refers to a node or its body, and no user function may change them."""
     bodies = bodies_of(mbs)
     before = _user_function("PreStep", mbs.GetPreStepUserFunction())
-    if bodies.following or bodies.preceding or before not in (None, bodies.before_step):
+    if bodies.user_post_step or bodies.user_pre_step or before not in (None, bodies.before_step):
         return False
-    if not bodies.installed(mbs) or mbs.GetPostNewtonUserFunction():
+    if not bodies.is_installed(mbs) or mbs.GetPostNewtonUserFunction():
         return False
-    own = mbs.GetObject(body)
-    if any(own[key] for key in own if key.endswith("UserFunction")):
+    parameters = mbs.GetObject(body)
+    if any(parameters[key] for key in parameters if key.endswith("UserFunction")):
         return False
     data = mbs.systemData
     markers = (mbs.GetMarker(exu.MarkerIndex(i)) for i in range(data.NumberOfMarkers()))
     others = (mbs.GetObject(exu.ObjectIndex(i)) for i in range(data.NumberOfObjects()) if i != int(body))
-    return not any(_refers(item, node, body) for item in itertools.chain(markers, others))
+    return not any(_refers_to(item, node, body) for item in itertools.chain(markers, others))
 
 
-def _refers(item: Mapping[str, Any], node: Any, body: Any) -> bool:
+def _refers_to(item: Mapping[str, Any], node: Any, body: Any) -> bool:
     nodes = [item.get("nodeNumber"), *item.get("nodeNumbers", ())]
     bodies = [item.get("bodyNumber"), item.get("objectNumber"), *item.get("bodyNumbers", ())]
     return int(node) in (int(n) for n in nodes if n is not None) or int(body) in (
@@ -231,5 +236,5 @@ def _refers(item: Mapping[str, Any], node: Any, body: Any) -> bool:
     )
 
 
-def _at_work(solver: Any, t: float) -> bool:
+def _is_running(solver: Any, t: float) -> bool:
     return solver is not None and not solver.output.finishedSuccessfully and solver.it.currentTime == t

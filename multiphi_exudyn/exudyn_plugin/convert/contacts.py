@@ -1,10 +1,10 @@
-"""Contacts of an Exudyn system, as mp.UnilateralContact: gaps, and rows by which they follow the coordinates.
+"""Contacts of an Exudyn system, as mp.UnilateralContact: gaps, and rows of their derivatives by the coordinates.
 
     gap = gap_0 + row . (q - q_0)
 
-Of ObjectContactCoordinate and of limit stops that is exact. A contact of spheres keeps the direction that it has at the
-current state: n (d x_1 / d q - d x_0 / d q), n the normal and x_0, x_1 the centres; whether a motion turns it is looked
-at after every run (linear_range.py).
+This is exact for ObjectContactCoordinate and limit stops. A contact of spheres keeps the direction of the current
+state: n (d x_1 / d q - d x_0 / d q), n the normal and x_0, x_1 the centres; its rotation is checked after every run
+(linear_range.py).
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
-from multiphi_exudyn.exudyn_plugin.convert.full_system import touch_of
-from multiphi_exudyn.exudyn_plugin.convert.items import has_stops, is_of_spheres
+from multiphi_exudyn.exudyn_plugin.convert.full_system import sphere_gap
+from multiphi_exudyn.exudyn_plugin.convert.items import has_limit_stops, is_sphere_contact
 from multiphi_exudyn.exudyn_plugin.convert.linearisation import Sphere
 from multiphi_exudyn.exudyn_plugin.convert.point_rows import coordinate_row, gap_row
 from multiphi_exudyn.mechanics.contact import UnilateralContact
@@ -25,16 +25,16 @@ __all__ = ["contact_distance", "contacts_of", "spheres_of"]
 
 
 def contact_distance(mbs: Any, index: int, item: Mapping[str, Any]) -> float:
-    """Gap [m] of a contact, or what the limits of a limit stop are compared with."""
+    """Gap [m] of a contact, or the displacement [m] of a limit stop."""
     outputs = exu.OutputVariableType
-    variable = outputs.Displacement if has_stops(item) else outputs.Distance
-    variable = outputs.DisplacementLocal if is_of_spheres(item) else variable
+    variable = outputs.Displacement if has_limit_stops(item) else outputs.Distance
+    variable = outputs.DisplacementLocal if is_sphere_contact(item) else variable
     return float(mbs.GetObjectOutput(exu.ObjectIndex(index), variable))
 
 
 def contacts_of(mbs: Any, index: int, item: Mapping[str, Any], distance: float) -> Iterator[UnilateralContact]:
     """Contacts of an object, their directions as rows (n_full,)."""
-    if not has_stops(item):
+    if not has_limit_stops(item):
         law = float(item["contactStiffness"]), float(item["contactDamping"])
         yield UnilateralContact(item["name"], _direction(mbs, index, item), distance, *law)
         return
@@ -46,14 +46,16 @@ def contacts_of(mbs: Any, index: int, item: Mapping[str, Any], distance: float) 
 
 
 def _direction(mbs: Any, index: int, item: Mapping[str, Any]) -> np.ndarray:
-    """Row (n_full,) by which the gap of a contact grows."""
-    if is_of_spheres(item):
+    """Row (n_full,) of the gap of a contact."""
+    if is_sphere_contact(item):
         return gap_row(mbs, exu.ObjectIndex(index))
     first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) for m in item["markerNumbers"])
     return second - first
 
 
 def spheres_of(mbs: Any, objects: Sequence[Mapping[str, Any]], contacts: Collection[str]) -> dict[str, Sphere]:
-    """The contacts of spheres that are part of the model, by their names, at the current state."""
-    found = {item["name"]: i for i, item in enumerate(objects) if is_of_spheres(item) and item["name"] in contacts}
-    return {name: Sphere(i, *touch_of(mbs, i)) for name, i in found.items()}
+    """Contacts of spheres that are part of the model, by name, at the current state."""
+    indices = {
+        item["name"]: i for i, item in enumerate(objects) if is_sphere_contact(item) and item["name"] in contacts
+    }
+    return {name: Sphere(i, *sphere_gap(mbs, i)) for name, i in indices.items()}

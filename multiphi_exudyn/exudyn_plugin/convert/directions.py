@@ -1,9 +1,9 @@
-"""Directions that constraints hold, and those that they leave free.
+"""Directions that constraints fix, and directions that they leave free.
 
-    M a = force - C^T mu,   C a = held
+    M a = force - C^T mu,   C a = prescribed
 
-a (n,) accelerations or any other motion, C (m, n) the Jacobian of the constraints, some of which may say the same, mu
-(m,) what they carry, M (n, n) positive definite where the constraints leave the system free.
+a (n,) accelerations or any other motion, C (m, n) the Jacobian of the constraints, which may be redundant, mu (m,)
+their multipliers, M (n, n) positive definite in the directions that the constraints leave free.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import scipy.linalg
 
 __all__ = ["Directions"]
 
-REDUNDANT = 1e-9  # of a constraint's row: what another constraint leaves of it, if it says the same
+REDUNDANT = 1e-9  # of a constraint's row: a smaller part that is independent of other constraints is round-off
 
 
 class Directions:
@@ -22,35 +22,38 @@ class Directions:
     def __init__(self, jacobian: np.ndarray, mass: np.ndarray) -> None:
         self._count = len(jacobian)
         moving = np.any(jacobian, axis=1)  # an inactive constraint has no row
-        self._used, self._mass = np.flatnonzero(moving), mass
-        held, free = np.zeros((len(mass), 0)), np.eye(len(mass))
+        self._independent, self._mass = np.flatnonzero(moving), mass
+        fixed, free = np.zeros((len(mass), 0)), np.eye(len(mass))
         self._triangle = np.zeros((0, 0))
-        if len(self._used):
-            rows = jacobian[self._used] / np.linalg.norm(jacobian[self._used], axis=1)[:, None]
+        if len(self._independent):
+            rows = jacobian[self._independent] / np.linalg.norm(jacobian[self._independent], axis=1)[:, None]
             q, r, order = scipy.linalg.qr(rows.T, pivoting=True)
             rank = int(np.sum(np.abs(np.diag(r)) > REDUNDANT))
-            self._lengths = np.linalg.norm(jacobian[self._used], axis=1)[order[:rank]]
-            self._used, self._triangle = self._used[order[:rank]], r[:rank, :rank]
-            held, free = q[:, :rank], q[:, rank:]
-        self._held, self._free = held, free
-        self._own = free.T @ mass @ free
+            self._lengths = np.linalg.norm(jacobian[self._independent], axis=1)[order[:rank]]
+            self._independent, self._triangle = self._independent[order[:rank]], r[:rank, :rank]
+            fixed, free = q[:, :rank], q[:, rank:]
+        self._fixed, self._free = fixed, free
+        self._free_mass = free.T @ mass @ free
 
     def size(self, vector: np.ndarray) -> float:
         """|vector|_M."""
         return float(np.sqrt(max(vector @ self._mass @ vector, 0.0)))
 
-    def solved(self, force: np.ndarray, held: np.ndarray) -> np.ndarray:
-        """a (n_full,) of M a = force - C^T mu, C a = held."""
-        given = np.zeros(len(force))
-        if len(self._used):
-            values = held[self._used] / self._lengths
-            given = self._held @ scipy.linalg.solve_triangular(self._triangle, values, trans="T")
-        return np.asarray(given + self._free @ np.linalg.solve(self._own, self._free.T @ (force - self._mass @ given)))
+    def solve(self, force: np.ndarray, prescribed: np.ndarray) -> np.ndarray:
+        """Solution a (n,) of M a = force - C^T mu, C a = prescribed."""
+        particular = np.zeros(len(force))
+        if len(self._independent):
+            values = prescribed[self._independent] / self._lengths
+            particular = self._fixed @ scipy.linalg.solve_triangular(self._triangle, values, trans="T")
+        return np.asarray(
+            particular + self._free @ np.linalg.solve(self._free_mass, self._free.T @ (force - self._mass @ particular))
+        )
 
-    def carried(self, force: np.ndarray) -> np.ndarray:
-        """mu (m,) for held = 0; of constraints that say the same one carries all."""
-        found = np.zeros(self._count)
-        if len(self._used):
-            left = force - self._mass @ self.solved(force, found)
-            found[self._used] = scipy.linalg.solve_triangular(self._triangle, self._held.T @ left) / self._lengths
-        return found
+    def multipliers(self, force: np.ndarray) -> np.ndarray:
+        """mu (m,) for prescribed = 0; redundant constraints have mu = 0."""
+        mu = np.zeros(self._count)
+        if len(self._independent):
+            reaction = force - self._mass @ self.solve(force, mu)
+            values = scipy.linalg.solve_triangular(self._triangle, self._fixed.T @ reaction)
+            mu[self._independent] = values / self._lengths
+        return mu

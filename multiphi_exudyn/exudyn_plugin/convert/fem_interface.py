@@ -3,8 +3,8 @@
     M_free x'' + C x' + K_free x = f,   x the displacements [m] of the nodes that are not fixed
 
 The matrices of a FEMinterface have no supports; degree of freedom 3 i + c is component c (0, 1, 2 for x, y, z) of
-node i, nodes counted from 0; "ux", "uy", "uz" name the components too. Fixed nodes are left out; the matrices stay
-sparse.
+node i, nodes counted from 0; "ux", "uy", "uz" are names of the components. The structure has no fixed nodes; its
+matrices are sparse.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ __all__ = ["linear_structure_from_fem"]
 Nodes: TypeAlias = "int | str"  # a node, or the name of a node set
 
 COMPONENTS = 3  # of the displacement of a node
-IN_LINE = 1e-9  # of the largest moment of inertia: nodes with less about an axis lie on it
+IN_LINE = 1e-9  # of the largest moment of inertia: with a smaller one about an axis, all nodes lie on it
 
 
 def linear_structure_from_fem(
@@ -54,7 +54,7 @@ def linear_structure_from_fem(
         Node numbers, or the name of a node set.
     points : mapping of str to (int or str, int or str), default None
         Name to (node number, component), 0 to 2 or "ux", "uy" and "uz"; with the name of a node set the mean of its
-        nodes by their weights, as a contact or a load over a face needs it; 3 to 5, or "rx", "ry" and "rz", of a
+        nodes by their weights, for a contact or a load over a face; 3 to 5, or "rx", "ry" and "rz", of a
         node set its mean rotation.
     damping : array (n, n), ModalDamping, RayleighDamping or None, default None
         In the free degrees of freedom.
@@ -62,14 +62,14 @@ def linear_structure_from_fem(
     Returns
     -------
     LinearStructure
-        Sparse, without the fixed nodes; its ``dofs`` say which degrees of freedom are left.
+        Sparse, without the fixed nodes; its ``dofs`` are the remaining degrees of freedom.
 
     Raises
     ------
     MultiPhiTypeError
-        For what is no FEMinterface, matrices that are missing, and nodes or points of another kind.
+        For an argument that is not a FEMinterface, matrices that are missing, and nodes or points of another kind.
     MultiPhiValueError
-        For matrices that do not fit the nodes, nodes, sets and components that there are not, and a point that is
+        For matrices that do not fit the nodes, nodes, sets and components that do not exist, and a point that is
         fixed.
 
     Examples
@@ -89,11 +89,11 @@ def linear_structure_from_fem(
     <LinearStructure: degrees of freedom 3; matrices sparse; damping none; points tip>
     """
     mass, stiffness = _matrices(fem)
-    held = _fixed_nodes(fem, fixed, mass.shape[0] // COMPONENTS)
+    fixed_nodes = _fixed_nodes(fem, fixed, mass.shape[0] // COMPONENTS)
     moving = np.ones((mass.shape[0] // COMPONENTS, COMPONENTS), bool)
-    moving[held] = False
+    moving[fixed_nodes] = False
     free = np.flatnonzero(moving)
-    rows = {name: _row(fem, name, given, moving) for name, given in ({} if points is None else points).items()}
+    rows = {name: _row(fem, name, point, moving) for name, point in ({} if points is None else points).items()}
     dofs = DofTable(tuple((int(dof) // COMPONENTS, NAMES[dof % COMPONENTS]) for dof in free))
     return LinearStructure(mass[free][:, free], stiffness[free][:, free], damping, rows, dofs=dofs)
 
@@ -122,56 +122,58 @@ def _fixed_nodes(fem: Any, fixed: Iterable[int] | str, count: int) -> np.ndarray
     return np.array([_number("fixed", node, count) for node in fixed], int)
 
 
-def _node_set(fem: Any, name: str, wanted: str) -> tuple[np.ndarray, np.ndarray]:
+def _node_set(fem: Any, name: str, set_name: str) -> tuple[np.ndarray, np.ndarray]:
     """Node numbers (k,) and weights (k,), their sum 1, of a node set."""
-    for given in fem.nodeSets:
-        if given["Name"] == wanted:
-            nodes = [_number(f"node set {wanted!r}", node, len(fem.nodes["Position"])) for node in given["NodeNumbers"]]
-            weights = np.asarray(given["NodeWeights"], float)
+    for node_set in fem.nodeSets:
+        if node_set["Name"] == set_name:
+            nodes = [
+                _number(f"node set {set_name!r}", node, len(fem.nodes["Position"])) for node in node_set["NodeNumbers"]
+            ]
+            weights = np.asarray(node_set["NodeWeights"], float)
             if weights.shape != (len(nodes),) or not np.sum(weights) > 0:
-                raise MultiPhiValueError(f"node set {wanted!r}: got weights {weights}, need {len(nodes)} of sum > 0")
+                raise MultiPhiValueError(f"node set {set_name!r}: got weights {weights}, need {len(nodes)} of sum > 0")
             return np.array(nodes, int), weights / np.sum(weights)
-    known = one_of(wanted, [given["Name"] for given in fem.nodeSets])
-    raise MultiPhiValueError(f"{name}: got node set {wanted!r}, need {known}")
+    choices = one_of(set_name, [node_set["Name"] for node_set in fem.nodeSets])
+    raise MultiPhiValueError(f"{name}: got node set {set_name!r}, need {choices}")
 
 
-def _row(fem: Any, name: str, given: Any, moving: np.ndarray) -> np.ndarray:
+def _row(fem: Any, name: str, point: Any, moving: np.ndarray) -> np.ndarray:
     """Row (n,) of (node or node set, component); moving: (nodes, 3) bool, n of them true."""
-    called = f"points[{name!r}]"
-    if not (isinstance(given, tuple) and len(given) == 2):
-        raise MultiPhiTypeError(f"{called}: got {given!r}, need (node number or node set, component)")
-    named = isinstance(given[1], str) and given[1] in NAMES
-    most = (2 if isinstance(given[0], str) else 1) * COMPONENTS
-    component = _number(f"{called} component", NAMES.index(given[1]) if named else given[1], most)
+    label = f"points[{name!r}]"
+    if not (isinstance(point, tuple) and len(point) == 2):
+        raise MultiPhiTypeError(f"{label}: got {point!r}, need (node number or node set, component)")
+    named = isinstance(point[1], str) and point[1] in NAMES
+    count = (2 if isinstance(point[0], str) else 1) * COMPONENTS
+    component = _number(f"{label} component", NAMES.index(point[1]) if named else point[1], count)
     row = np.zeros(moving.shape)
-    if isinstance(given[0], str):
-        nodes, weights = _node_set(fem, called, given[0])
+    if isinstance(point[0], str):
+        nodes, weights = _node_set(fem, label, point[0])
         if component < COMPONENTS:
             np.add.at(row[:, component], nodes, weights)
         else:
-            np.add.at(row, nodes, _rotation(called, fem.nodes["Position"][nodes], weights)[component - COMPONENTS])
+            np.add.at(row, nodes, _rotation(label, fem.nodes["Position"][nodes], weights)[component - COMPONENTS])
     else:
-        row[_number(called, given[0], len(moving)), component] = 1.0
+        row[_number(label, point[0], len(moving)), component] = 1.0
     if not np.any(row[moving]):
-        raise MultiPhiValueError(f"{called}: got {given!r}, which is fixed, need a point that can move")
+        raise MultiPhiValueError(f"{label}: got {point!r}, which is fixed, need a point that can move")
     return row[moving]
 
 
-def _rotation(name: str, places: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Mean rotation (3, k, 3) of nodes at places (k, 3) with weights (k,), by the displacements of each."""
-    arms = places - weights @ places
+def _rotation(name: str, positions: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Mean rotation (3, k, 3) of nodes at positions (k, 3) with weights (k,), by the displacements of each node."""
+    arms = positions - weights @ positions
     inertia = np.sum(weights * np.sum(arms**2, axis=1)) * np.eye(3) - (weights * arms.T) @ arms
     values = np.linalg.eigvalsh(inertia)
     if not values[0] > IN_LINE * values[-1]:
         raise MultiPhiValueError(f"{name}: got nodes on one line, which have no rotation about it, need others")
-    turned = np.cross(arms[:, None, :], np.eye(3))  # r x e_c, (k, c, 3)
-    found: np.ndarray = np.einsum("ij,k,kcj->ikc", np.linalg.inv(inertia), weights, turned)
-    return found
+    cross_products = np.cross(arms[:, None, :], np.eye(3))  # r x e_c, (k, c, 3)
+    rotations: np.ndarray = np.einsum("ij,k,kcj->ikc", np.linalg.inv(inertia), weights, cross_products)
+    return rotations
 
 
-def _number(name: str, given: Any, count: int) -> int:
-    if isinstance(given, bool) or not isinstance(given, (int, np.integer)):
-        raise MultiPhiTypeError(f"{name}: got {given!r}, need a number from 0 to {count - 1}")
-    if not 0 <= given < count:
-        raise MultiPhiValueError(f"{name}: got {given}, need 0 <= number < {count}")
-    return int(given)
+def _number(name: str, number: Any, count: int) -> int:
+    if isinstance(number, bool) or not isinstance(number, (int, np.integer)):
+        raise MultiPhiTypeError(f"{name}: got {number!r}, need a number from 0 to {count - 1}")
+    if not 0 <= number < count:
+        raise MultiPhiValueError(f"{name}: got {number}, need 0 <= number < {count}")
+    return int(number)

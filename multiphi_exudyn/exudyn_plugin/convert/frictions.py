@@ -2,10 +2,11 @@
 
     q = factor1 q_1 - factor0 q_0,   stick: T = k_s (q - s), |T| <= F,   slip: T = F sign(q')
 
-s the bristle's place, k_s stickingStiffness, F dynamicFrictionForce: Friction(limit=F, stiffness=k_s), whatever spring,
-damper and limit stops the connector has beside it, if the bristle sticks where the reduction is made, s = q. Everything
-else that the connector offers as friction is another law, and left out with its name. (velocityOffset is the damper's.)
-A hair of staticFrictionOffsetForce is taken: without one Exudyn's own runs may slip to the wrong side where stick ends.
+s is the bristle's position, k_s stickingStiffness, F dynamicFrictionForce. The element is Friction(limit=F,
+stiffness=k_s), if the bristle sticks without stretch in the state of the reduction, s = q; the connector may have a
+spring, a damper and limit stops as well. Other friction of this connector has another law, and is left out with its
+name. (velocityOffset belongs to the damper.) A very small staticFrictionOffsetForce is allowed: without one, Exudyn's
+own runs may slip in the wrong direction when stick ends.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ from multiphi_exudyn.mechanics.friction import Friction
 
 __all__ = ["frictions_of"]
 
-HAIR = 1e-3  # of the limit: a static offset so small is a limit of its own, however it falls with the speed
-UNSTRETCHED = 1e-9  # of the limit: what a bristle at its place carries by round-off
+SMALL_OFFSET = 1e-3  # of the limit: a smaller static offset is part of the static limit, at any speed
+UNSTRETCHED = 1e-9  # of the limit: a smaller bristle force is round-off
 
 
 def frictions_of(mbs: Any, objects: Sequence[Mapping[str, Any]]) -> dict[int, Friction | str]:
-    """Active connectors with friction by index, their directions as rows (n_full,), or why one is no Friction."""
+    """Frictions of active connectors by index, directions as rows (n_full,), or the reason why one has another law."""
     return {i: _friction(mbs, i, item) for i, item in enumerate(objects) if has_friction(item)}
 
 
@@ -41,10 +42,10 @@ def _friction(mbs: Any, index: int, item: Mapping[str, Any]) -> Friction | str:
 
 
 def _law(item: Mapping[str, Any]) -> str:
-    """What makes it another law; empty if nothing does."""
+    """Reason why the law differs from that of Friction; empty if it does not."""
     if item["frictionProportionalZone"] != 0:
         return "friction in proportion to slow speeds (frictionProportionalZone), which creeps where it should stick"
-    if item["staticFrictionOffsetForce"] > HAIR * item["dynamicFrictionForce"]:
+    if item["staticFrictionOffsetForce"] > SMALL_OFFSET * item["dynamicFrictionForce"]:
         return "friction that falls with the speed (staticFrictionOffsetForce, exponentialDecayStatic)"
     if item["viscousFrictionFactor"] != 0:
         return "friction that grows with the speed of slip (viscousFrictionFactor)"
@@ -54,11 +55,11 @@ def _law(item: Mapping[str, Any]) -> str:
 
 
 def _state(mbs: Any, index: int, item: Mapping[str, Any]) -> str:
-    """Why its data node is none of a bristle at rest, where the system stands; empty if it is."""
-    state, place, _ = mbs.systemData.GetDataCoordinates()[mbs.systemData.GetObjectLTGData(index)]
+    """Reason why the bristle slips or is stretched in the current state; empty if it does not."""
+    state, position, _ = mbs.systemData.GetDataCoordinates()[mbs.systemData.GetObjectLTGData(index)]
     if state != 0:
         return f"friction that slips already (data coordinate 0: {state:g}), need a bristle that sticks: 0"
     travel = mbs.GetObjectOutput(exu.ObjectIndex(index), exu.OutputVariableType.Displacement)
-    if abs(item["stickingStiffness"] * (travel - place)) > UNSTRETCHED * item["dynamicFrictionForce"]:
-        return f"friction with a stretched bristle (data coordinate 1: {place:g}), need its coordinate: {travel:g}"
+    if abs(item["stickingStiffness"] * (travel - position)) > UNSTRETCHED * item["dynamicFrictionForce"]:
+        return f"friction with a stretched bristle (data coordinate 1: {position:g}), need its coordinate: {travel:g}"
     return ""

@@ -1,10 +1,10 @@
-"""An Exudyn system without its contacts, asked for its accelerations at coordinates that are given to it.
+"""Accelerations of an Exudyn system without its contacts, at any coordinates and velocities.
 
     M(q) a = f(q, v) + force - C(q)^T mu,   C(q) a = -(d C(q)/dt) v,   g(q) = g(q_0),   C(q) v = C(q_0) v_0
 
 q, v, a (n_full,) coordinates [m, rad], velocities and accelerations, f [N, N m] all forces but those of constraints,
-contacts, limit stops and friction, g (m,) the constraints, C their Jacobian, mu what they carry. Coordinates that do
-not meet the constraints are first moved onto them by the shift that is shortest in M.
+contacts, limit stops and friction, g (m,) the constraints, C their Jacobian, mu their multipliers. Coordinates that
+violate the constraints are first moved onto them by the shift of least norm in M.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from multiphi_exudyn.exudyn_plugin.convert.geometric_stiffness import (
     generalised_forces,
     static_solver,
 )
-from multiphi_exudyn.exudyn_plugin.convert.items import rough_parameters, user_function, value_key
+from multiphi_exudyn.exudyn_plugin.convert.items import contact_parameters, user_function, value_key
 
-__all__ = ["FullSystem", "initial_is_current", "items_of", "smooth", "touch_of"]
+__all__ = ["FullSystem", "initial_is_current", "items_of", "sphere_gap", "without_contacts"]
 
-STEP = 1e-4  # of the reach of a motion, by which C is differentiated along it: an error of 1e-8, and 1e-12 of round-off
+STEP = 1e-4  # of the largest displacement: step of the derivative of C, with an error of 1e-8 and round-off of 1e-12
 
 
 def items_of(mbs: Any) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
@@ -38,7 +38,7 @@ def items_of(mbs: Any) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
 
 @contextmanager
 def initial_is_current(mbs: Any) -> Iterator[None]:
-    """Make the current state the initial one, about which Exudyn linearises; restore all of them afterwards."""
+    """Make the current state the initial one, about which Exudyn linearises; all states are restored afterwards."""
     data, kinds = mbs.systemData, exu.ConfigurationType
     stored = {
         kind: (data.GetSystemState(kind), data.GetODE2Coordinates_tt(kind), data.GetTime(kind))
@@ -54,7 +54,7 @@ def initial_is_current(mbs: Any) -> Iterator[None]:
             data.SetTime(time, kind)
 
 
-def touch_of(mbs: Any, index: int) -> tuple[float, np.ndarray]:
+def sphere_gap(mbs: Any, index: int) -> tuple[float, np.ndarray]:
     """Gap [m] and unit normal (3,) of a contact of spheres at the current state."""
     item, outputs = exu.ObjectIndex(index), exu.OutputVariableType
     gap, normal = (mbs.GetObjectOutput(item, each) for each in (outputs.DisplacementLocal, outputs.Director1))
@@ -62,10 +62,12 @@ def touch_of(mbs: Any, index: int) -> tuple[float, np.ndarray]:
 
 
 @contextmanager
-def smooth(mbs: Any, objects: Sequence[Mapping[str, Any]], loads: Sequence[Mapping[str, Any]]) -> Iterator[None]:
-    """Switch off contacts, limit stops, friction and loads by user functions; on again whatever happens."""
+def without_contacts(
+    mbs: Any, objects: Sequence[Mapping[str, Any]], loads: Sequence[Mapping[str, Any]]
+) -> Iterator[None]:
+    """Switch off contacts, limit stops, friction and loads by user functions; they are restored in any case."""
     changes = [
-        (exu.ObjectIndex(i), name, off) for i, item in enumerate(objects) for name, off in rough_parameters(item)
+        (exu.ObjectIndex(i), name, off) for i, item in enumerate(objects) for name, off in contact_parameters(item)
     ]
     timed = {exu.LoadIndex(i): load for i, load in enumerate(loads) if user_function(load)}
     try:
@@ -85,71 +87,74 @@ def smooth(mbs: Any, objects: Sequence[Mapping[str, Any]], loads: Sequence[Mappi
 
 
 @dataclass(frozen=True)
-class Moved:
-    """A state on the constraints: |shift|_M that led there, and the accelerations (n_full,)."""
+class ConstrainedState:
+    """A state that meets the constraints: norm |shift|_M of its correction, and the accelerations (n_full,)."""
 
     shift: float
     accelerations: np.ndarray
 
 
 class FullSystem:
-    """A system between ``opened`` and its end; ``mbs`` is then without contacts, and the state is at our disposal."""
+    """A system inside the context of ``opened``, without contacts, whose state may be changed."""
 
     def __init__(self, mbs: Any, solver: Any, displacement: np.ndarray, velocity: np.ndarray) -> None:
         self._mbs, self._solver = mbs, solver
         self._set(displacement, velocity)
         self._start = displacement, velocity
         self._constraints = self._residual()
-        self._held = constraint_jacobian(mbs, solver) @ velocity
+        self._constraint_velocity = constraint_jacobian(mbs, solver) @ velocity
 
     @classmethod
     @contextmanager
     def opened(cls, mbs: Any, displacement: np.ndarray, velocity: np.ndarray, time: float) -> Iterator[FullSystem]:
-        """The system with q_0, v_0, (n_full,), at a time [s]; left as it was, whatever happens."""
-        with initial_is_current(mbs), smooth(mbs, *items_of(mbs)), static_solver(mbs) as solver:
+        """The system with q_0, v_0, (n_full,), at a time [s]; it is restored in any case."""
+        with initial_is_current(mbs), without_contacts(mbs, *items_of(mbs)), static_solver(mbs) as solver:
             mbs.systemData.SetTime(time)
             yield cls(mbs, solver, displacement, velocity)
 
     def set_time(self, time: float) -> None:
-        """Let user functions see a time [s]."""
+        """Set the time [s] of user functions."""
         self._mbs.systemData.SetTime(time)
 
     def load(self, index: int, value: np.ndarray) -> None:
-        """Give a load by a user function its value at present, (k,)."""
+        """Set the present value (k,) of a load by a user function."""
         load = exu.LoadIndex(index)
         key = value_key(self._mbs.GetLoad(load))
         self._mbs.SetLoadParameter(load, key, float(value[0]) if key == "load" else value)
 
-    def touch(self, index: int) -> tuple[float, np.ndarray]:
-        """Gap [m] and unit normal (3,) of a contact of spheres where the system was moved to."""
-        return touch_of(self._mbs, index)
+    def gap_and_normal(self, index: int) -> tuple[float, np.ndarray]:
+        """Gap [m] and unit normal (3,) of a contact of spheres, in the present state."""
+        return sphere_gap(self._mbs, index)
 
-    def moved(self, displacement: np.ndarray, velocity: np.ndarray, force: np.ndarray, reach: float) -> Moved:
-        """The system at q, v, (n_full,), under a force besides its own; reach: the largest |q - q_0| of the motion."""
-        nothing = np.zeros(len(displacement))
+    def accelerations_at(
+        self, displacement: np.ndarray, velocity: np.ndarray, force: np.ndarray, scale: float
+    ) -> ConstrainedState:
+        """The system at q, v, (n_full,), under an additional force; scale: largest |q - q_0| of the motion."""
+        zero = np.zeros(len(displacement))
         self._set(displacement, self._start[1])
         directions = Directions(self._jacobian(), self._mass())
-        shift = directions.solved(nothing, self._constraints - self._residual())
+        shift = directions.solve(zero, self._constraints - self._residual())
         self._set(displacement + shift, velocity)
         jacobian = self._jacobian()
         directions = Directions(jacobian, self._mass())
-        velocity = velocity + directions.solved(nothing, self._held - jacobian @ velocity)
-        turning = self._turning(displacement + shift, velocity, reach)
+        velocity = velocity + directions.solve(zero, self._constraint_velocity - jacobian @ velocity)
+        rate = self._jacobian_rate(displacement + shift, velocity, scale)
         self._set(displacement + shift, velocity)
         forces = generalised_forces(self._mbs, self._solver) + force
-        return Moved(directions.size(shift), directions.solved(forces, -turning))
+        return ConstrainedState(directions.size(shift), directions.solve(forces, -rate))
 
-    def _turning(self, displacement: np.ndarray, velocity: np.ndarray, reach: float) -> np.ndarray:
+    def _jacobian_rate(self, displacement: np.ndarray, velocity: np.ndarray, scale: float) -> np.ndarray:
         """(d C/dt) v by central differences."""
         fastest = np.max(np.abs(velocity))
-        if not fastest * reach > 0 or not len(self._held):
-            return np.zeros(len(self._held))
-        step = STEP * reach / fastest
-        both = []
+        count = len(self._constraint_velocity)
+        if not fastest * scale > 0 or not count:
+            return np.zeros(count)
+        step = STEP * scale / fastest
+        products = []
         for sign in (1, -1):
             self._set(displacement + sign * step * velocity, velocity)
-            both.append(self._jacobian() @ velocity)
-        return (both[0] - both[1]) / (2 * step)
+            products.append(self._jacobian() @ velocity)
+        return (products[0] - products[1]) / (2 * step)
 
     def _set(self, displacement: np.ndarray, velocity: np.ndarray) -> None:
         self._mbs.systemData.SetODE2Coordinates(displacement)

@@ -1,4 +1,4 @@
-"""What a reduction makes of each item of an Exudyn system: taken as what, or left out for which reason."""
+"""Item fates: the part of each item of an Exudyn system in a reduced model, or the reason why it is left out."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from multiphi_exudyn.exudyn_plugin.convert.items import (
     DAMPER_EXT,
     Item,
     has_friction,
-    has_stops,
+    has_limit_stops,
     is_active,
     is_constraint,
     is_contact,
-    is_of_spheres,
+    is_sphere_contact,
     refusal_of,
     user_function,
 )
@@ -30,14 +30,14 @@ __all__ = [
 ]
 
 INACTIVE = "not active"
-HELD_GAP = "constraints hold its gap"
-HELD_GAPS = "constraints hold the gaps of its limit stops"
-HELD_FRICTION = "constraints hold the coordinate of its friction"
-IDLE = (INACTIVE, HELD_GAP, HELD_GAPS, HELD_FRICTION)  # reasons for which leaving an item out changes no motion
+FIXED_GAP = "constraints hold its gap"
+FIXED_GAPS = "constraints hold the gaps of its limit stops"
+FIXED_FRICTION = "constraints hold the coordinate of its friction"
+WITHOUT_EFFECT = (INACTIVE, FIXED_GAP, FIXED_GAPS, FIXED_FRICTION)  # reasons of items that have no effect on a motion
 USER_FUNCTION = (
-    "the difference of its user function from its tangent at the current state"  # a run's check asks the system for it
+    "the difference of its user function from its tangent at the current state"  # evaluated by the check of a run
 )
-NAMED = 3  # items of a group that are told by name: enough to find the others
+NAMES_SHOWN = 3  # names of items that are shown for a group
 _LINEAR = {
     "GenericODE2",
     "Mass1D",
@@ -54,16 +54,16 @@ _ONE_SIDED = {
 
 
 def taken_objects(objects: Sequence[Mapping[str, Any]], contacts: Collection[str]) -> Iterator[Item]:
-    """Objects of the model; contacts: the names of its contacts and frictions."""
+    """Objects that are part of the model; contacts: names of its contacts and frictions."""
     for i, item in enumerate(objects):
         if is_active(item) and (not is_contact(item) or item["name"] in contacts):
-            yield _object_item(i, item, _became(item, contacts))
+            yield _object_item(i, item, _role(item, contacts))
 
 
 def left_out_objects(
     objects: Sequence[Mapping[str, Any]], contacts: Collection[str], frictions: Mapping[int, str]
 ) -> Iterator[tuple[Item, str]]:
-    """Objects that are no part of the model, or not as a whole, with the reason; frictions: reasons of theirs."""
+    """Objects that the model does not contain, or not completely, with the reason; frictions: reasons for friction."""
     for i, item in enumerate(objects):
         reason = _reason(item, contacts, frictions.get(i, ""))
         if reason:
@@ -71,39 +71,39 @@ def left_out_objects(
 
 
 def left_out_functions(mbs: Any) -> Iterator[tuple[Item, str]]:
-    """User functions of the system itself, which may do anything in a run."""
+    """User functions of the system itself, whose effect on a run is unknown."""
     for kind in ("PreStep", "PostStep", "PostNewton", "PreNewtonResidual"):
         if getattr(mbs, f"Get{kind}UserFunction")():
             yield Item("mbs", 0, f"{kind}UserFunction"), "what it does in a run"
 
 
-def left_out_directions(of: str) -> Iterator[tuple[Item, str]]:
-    """Directions that are left out because nothing moves the system there; of: what is wrong with them."""
-    yield Item("mbs", 0, "MainSystem"), f"directions in which nothing moves it, {of}"
+def left_out_directions(reason: str) -> Iterator[tuple[Item, str]]:
+    """Directions that are left out because nothing moves the system there; reason: why a structure cannot have them."""
+    yield Item("mbs", 0, "MainSystem"), f"directions in which nothing moves it, {reason}"
 
 
-def grouped(told: Iterable[tuple[Item, str]]) -> list[str]:
-    """Sentences "16 ObjectContactCircleCable2D ('a', 'b', ...): ...", one for each type and what is said of it."""
+def grouped(items: Iterable[tuple[Item, str]]) -> list[str]:
+    """Sentences "16 ObjectContactCircleCable2D ('a', 'b', ...): ...", one for each type of item and text."""
     groups: dict[tuple[str, str], list[str]] = {}
-    for item, said in told:
-        groups.setdefault((item.type, said), []).append(repr(item.name))
-    return [f"{_members(kind, names)}: {said}" for (kind, said), names in groups.items()]
+    for item, text in items:
+        groups.setdefault((item.type, text), []).append(repr(item.name))
+    return [f"{_members(kind, names)}: {text}" for (kind, text), names in groups.items()]
 
 
 def _members(kind: str, names: Sequence[str]) -> str:
     if len(names) == 1:
         return f"{kind} {names[0]}"
-    more = ["..."] if len(names) > NAMED else []
-    return f"{len(names)} {kind} ({', '.join([*names[:NAMED], *more])})"
+    more = ["..."] if len(names) > NAMES_SHOWN else []
+    return f"{len(names)} {kind} ({', '.join([*names[:NAMES_SHOWN], *more])})"
 
 
 def missing_parts(left_out: Iterable[tuple[Item, str]]) -> list[str]:
-    """What a run of the model lacks, grouped; what is switched off or held acts in no run."""
-    return grouped((item, reason) for item, reason in left_out if reason not in IDLE)
+    """Parts of the system that a run of the model lacks, grouped; without those that have no effect."""
+    return grouped((item, reason) for item, reason in left_out if reason not in WITHOUT_EFFECT)
 
 
 def linearised_functions(left_out: Iterable[tuple[Item, str]]) -> list[str]:
-    """The part of it that the system itself can be asked for at any state, grouped."""
+    """Those of the missing parts that can be evaluated in the system at any state, grouped."""
     return grouped((item, reason) for item, reason in left_out if reason == USER_FUNCTION)
 
 
@@ -116,17 +116,17 @@ def _object_item(index: int, item: Mapping[str, Any], became: str = "") -> Item:
 
 
 def _reason(item: Mapping[str, Any], contacts: Collection[str], friction: str) -> str:
-    """Why an object, or a part of it, is left out; empty if it is not."""
+    """Reason why an object, or a part of it, is left out; empty if it is not."""
     if not is_active(item):
         return INACTIVE
     if is_contact(item) and item["name"] not in contacts:
-        return refusal_of(item) or HELD_GAP
-    if has_stops(item) and not _stops(item, contacts):
-        return HELD_GAPS
+        return refusal_of(item) or FIXED_GAP
+    if has_limit_stops(item) and not _stops(item, contacts):
+        return FIXED_GAPS
     if friction:
         return friction
     if has_friction(item) and item["name"] not in contacts:
-        return HELD_FRICTION
+        return FIXED_FRICTION
     if item["objectType"] in _ONE_SIDED:
         return _ONE_SIDED[item["objectType"]]
     if is_constraint(item) and (user_function(item).startswith("offset") or _prescribes_velocity(item)):
@@ -140,9 +140,9 @@ def _prescribes_velocity(item: Mapping[str, Any]) -> bool:
     return bool(item.get("velocityLevel", False)) and bool(item.get("offset", 0.0))
 
 
-def _became(item: Mapping[str, Any], contacts: Collection[str]) -> str:
+def _role(item: Mapping[str, Any], contacts: Collection[str]) -> str:
     if is_contact(item):
-        present = ", in its present direction" if is_of_spheres(item) else ""
+        present = ", in its present direction" if is_sphere_contact(item) else ""
         return f"contact, {item['contactStiffness']:g} N/m{_damper(item['contactDamping'])}{present}"
     if item["objectType"] == "Ground":
         return "ground"
@@ -158,7 +158,7 @@ def _became(item: Mapping[str, Any], contacts: Collection[str]) -> str:
 
 
 def _stops(item: Mapping[str, Any], contacts: Collection[str]) -> list[str]:
-    """Names of the contacts that an object's limit stops became."""
+    """Names of the contacts of the model from an object's limit stops."""
     return [name for name in (f"{item['name']}.upper", f"{item['name']}.lower") if name in contacts]
 
 

@@ -1,9 +1,9 @@
-"""Items of an Exudyn system, as GetObject and GetLoad tell them, and what kind each is of.
+"""Items of an Exudyn system, from GetObject and GetLoad, and functions that determine their kinds.
 
 Contacts of a model are ObjectContactCoordinate and ObjectContactSphereSphere, -SphereTriangle and -SphereTorus with a
-linear law without friction, and the limit stops of ObjectConnectorCoordinateSpringDamperExt, its friction that of the
-latter (frictions.py); everything else is a matrix, a constraint, a load, or left out with a reason
-(item_fates.py).
+linear law without friction, and the limit stops of ObjectConnectorCoordinateSpringDamperExt. Friction of a model is
+that of the latter object (frictions.py). Everything else is a part of the matrices, a constraint, a load, or left out
+for a reason (item_fates.py).
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ import numpy as np
 __all__ = [
     "DAMPER_EXT",
     "Item",
+    "contact_parameters",
     "has_contact",
     "has_friction",
-    "has_stops",
+    "has_limit_stops",
     "is_active",
     "is_constraint",
     "is_contact",
-    "is_curved",
-    "is_of_spheres",
+    "is_nonlinear_constraint",
+    "is_sphere_contact",
     "refusal_of",
-    "rough_parameters",
     "user_function",
     "value_key",
 ]
@@ -34,7 +34,7 @@ __all__ = [
 
 DAMPER_EXT = "ConnectorCoordinateSpringDamperExt"
 _FRICTION = ("dynamicFrictionForce", "staticFrictionOffsetForce", "viscousFrictionFactor")
-_SPHERES = "ContactSphereSphere"  # what Exudyn calls spheres on spheres, on triangles and on a torus alike
+_SPHERES = "ContactSphereSphere"  # Exudyn's type of a sphere on a sphere, on triangles and on a torus
 _CONTACT_LAW = {  # of a linear spring on one side
     "impactModel": ("impact model", 0),
     "contactStiffnessExponent": ("stiffness exponent", 1),
@@ -47,18 +47,18 @@ _COORDINATE_CONSTRAINTS = {"ConnectorCoordinate", "ConnectorCoordinateVector"}
 
 @dataclass(frozen=True)
 class Item:
-    """One item of an Exudyn system, and what a reduction made of it.
+    """One item of an Exudyn system, and its part in the model of a reduction.
 
     Attributes
     ----------
     name : str
-        Of the item.
+        Name of the item.
     index : int
-        Among objects or loads; 0 for the system.
+        Index among objects or loads; 0 for the system.
     type : str
-        Exudyn's type of it.
+        Exudyn's type of the item.
     became : str
-        What it is in the model; empty where it was left out.
+        Its part in the model; empty if it was left out.
 
     Examples
     --------
@@ -97,42 +97,42 @@ class Item:
     became: str = ""
 
 
-def has_stops(item: Mapping[str, Any]) -> bool:
+def has_limit_stops(item: Mapping[str, Any]) -> bool:
     """True for an object with limit stops in use."""
     return item["objectType"] == DAMPER_EXT and item["useLimitStops"] and item["limitStopsStiffness"] > 0
 
 
 def has_contact(item: Mapping[str, Any]) -> bool:
-    """True for an active object that gives the model one contact or two."""
-    return is_active(item) and (has_stops(item) or (is_contact(item) and not refusal_of(item)))
+    """True for an active object that becomes one or two contacts of the model."""
+    return is_active(item) and (has_limit_stops(item) or (is_contact(item) and not refusal_of(item)))
 
 
 def has_friction(item: Mapping[str, Any]) -> bool:
     """True for an active connector with friction of its own law."""
-    rubs = item["objectType"] == DAMPER_EXT and any(float(item[name]) for name in _FRICTION)
-    return rubs and is_active(item) and not user_function(item)
+    frictional = item["objectType"] == DAMPER_EXT and any(float(item[name]) for name in _FRICTION)
+    return frictional and is_active(item) and not user_function(item)
 
 
 def is_constraint(item: Mapping[str, Any]) -> bool:
-    """True for a joint or another connector that holds coordinates, whatever forces that takes."""
+    """True for a joint or another connector that is a constraint."""
     kind = str(item["objectType"])
     return kind.startswith(_CONSTRAINTS) or kind in _COORDINATE_CONSTRAINTS
 
 
-def is_of_spheres(item: Mapping[str, Any]) -> bool:
-    """True for a contact of a sphere, whose direction is that of its gradient at the current state."""
+def is_sphere_contact(item: Mapping[str, Any]) -> bool:
+    """True for a contact of a sphere, which has the direction of its gap's gradient at the current state."""
     return bool(item["objectType"] == _SPHERES)
 
 
-def is_curved(item: Mapping[str, Any]) -> bool:
-    """True for an active constraint that is not linear in the coordinates, whose force gives stiffness."""
-    bent = [item.get(key) for key in ("quadraticTermMarker0", "quadraticTermMarker1", "constraintUserFunction")]
-    curved = str(item["objectType"]).startswith(_CONSTRAINTS) or any(np.any(term) for term in bent if term is not None)
+def is_nonlinear_constraint(item: Mapping[str, Any]) -> bool:
+    """True for an active constraint that is not linear in the coordinates, so that its force gives stiffness."""
+    terms = [item.get(key) for key in ("quadraticTermMarker0", "quadraticTermMarker1", "constraintUserFunction")]
+    curved = str(item["objectType"]).startswith(_CONSTRAINTS) or any(np.any(term) for term in terms if term is not None)
     return is_constraint(item) and is_active(item) and curved
 
 
-def rough_parameters(item: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    """Parameters that take contact and friction out of an object, and their values without."""
+def contact_parameters(item: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Parameters of an object's contact and friction, with the values that switch them off."""
     if is_contact(item) and is_active(item):
         return [("activeConnector", False)]
     if item["objectType"] != DAMPER_EXT:
@@ -156,17 +156,17 @@ def is_active(item: Mapping[str, Any]) -> bool:
 
 
 def is_contact(item: Mapping[str, Any]) -> bool:
-    """True for a contact object of any law; limit stops are none."""
+    """True for a contact object of any law; limit stops are not contact objects."""
     return str(item["objectType"]).startswith("Contact")
 
 
 def refusal_of(item: Mapping[str, Any]) -> str:
-    """Why an active contact object is no unilateral spring; empty if it is one."""
+    """Reason why an active contact object is not a unilateral spring; empty if it is."""
     if item["objectType"] not in ("ContactCoordinate", _SPHERES):
         return "its point of contact moves over a surface, so that its gap is no linear function of coordinates"
-    for key, (called, needed) in _CONTACT_LAW.items():
+    for key, (label, needed) in _CONTACT_LAW.items():
         if item.get(key, needed) != needed:
-            return f"{called} {item[key]:g}, need {needed}"
+            return f"{label} {item[key]:g}, need {needed}"
     if not item["contactStiffness"] > 0:
         return f"contact stiffness {item['contactStiffness']:g}, need a value > 0"
     return ""

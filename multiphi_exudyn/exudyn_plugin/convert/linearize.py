@@ -2,12 +2,11 @@
 
     q = q_0 + S z,   M = S^T M_q S,  C = S^T C_q S,  K = S^T K_q S
 
-q [m, rad, ...] are the system's ODE2 coordinates, q_0 the current ones, S a basis of the directions the
-constraints leave free (orthonormal columns, from the constraint Jacobian at q_0), z the coordinates of
-the linear structure. The state must be an equilibrium of everything but the contacts and the constraint
-forces: a linear structure has no constant force. What a linear structure cannot hold is not looked for
-beyond that: user functions and other nonlinear forces enter by their tangent at q_0, loads only by
-their geometric stiffness (geometric_stiffness.py).
+q [m, rad, ...] are the system's ODE2 coordinates, q_0 the current ones, S a basis of the directions the constraints
+leave free (orthonormal columns, from the constraint Jacobian at q_0), z the coordinates of the linear structure. The
+state must be an equilibrium of all forces but those of contacts and constraints, as a linear structure has no constant
+force. Nonlinearities are not searched for beyond that: user functions and other nonlinear forces enter by their tangent
+at q_0, loads only by their geometric stiffness (geometric_stiffness.py).
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.convert.full_system import initial_is_current
 from multiphi_exudyn.exudyn_plugin.convert.linearized_structure import LinearizedStructure
-from multiphi_exudyn.exudyn_plugin.convert.point_rows import coordinate_row, default_points, given_points
+from multiphi_exudyn.exudyn_plugin.convert.point_rows import coordinate_row, default_points, requested_points
 from multiphi_exudyn.exudyn_plugin.convert.system_matrices import forces, projected_matrices
 from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.contact import UnilateralContact
@@ -30,7 +29,7 @@ from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
 
 __all__ = ["check_system", "linear_structure_from"]
 
-EQUILIBRIUM = 1e-6  # of the largest elastic force: what a static solution leaves unbalanced
+EQUILIBRIUM = 1e-6  # of the largest elastic force: residual of a static solution
 LARGEST = 10_000  # ODE2 coordinates: a dense matrix of them has 0.8 GB
 PICOMETRE = 1e-12  # m; a force that moves the stiffest coordinate by less than this is round-off
 
@@ -45,8 +44,8 @@ def linear_structure_from(
         q = q_0 + S z,   M = S^T M_q S,  C = S^T C_q S,  K = S^T K_q S
 
     q are the system's ODE2 coordinates, q_0 the current ones, S a basis of the directions that constraints leave free.
-    The state must be an equilibrium of everything but the contacts and the constraint forces: a linear structure has no
-    constant force (``reduce`` takes any state). User functions and other nonlinear forces enter by their tangent at
+    The state must be an equilibrium of all forces but those of contacts and constraints, as a linear structure has no
+    constant force (``reduce`` accepts any state). User functions and other nonlinear forces enter by their tangent at
     q_0.
 
     Parameters
@@ -74,8 +73,8 @@ def linear_structure_from(
     MultiPhiTypeError
         For points of another kind.
     MultiPhiValueError
-        For a system that is not assembled or not of second order, a state that is no equilibrium, and a contact or a
-        matrix that a linear structure cannot hold.
+        For a system that is not assembled or not of second order, a state that is not an equilibrium, and a contact or
+        a matrix that a linear structure cannot have.
 
     Examples
     --------
@@ -111,14 +110,14 @@ def linear_structure_from(
     objects = _contact_objects(mbs)
     with initial_is_current(mbs):
         gaps = [_gap(mbs, index) for index in objects]
-        with _inactive(mbs, objects):
-            found, basis = projected_matrices(mbs)
-            _check_equilibrium(mbs, found.stiffness, basis)
-        rows = default_points(mbs, basis) if points is None else given_points(mbs, points, basis)
+        with _without_contacts(mbs, objects):
+            matrices, basis = projected_matrices(mbs)
+            _check_equilibrium(mbs, matrices.stiffness, basis)
+        rows = default_points(mbs, basis) if points is None else requested_points(mbs, points, basis)
         contacts = tuple(_contact(mbs, index, gap, basis) for index, gap in zip(objects, gaps, strict=True))
-    if damping is None and np.any(found.damping):
-        damping = found.damping
-    structure = LinearizedStructure(found.mass, found.stiffness, damping, rows, coordinates=basis)
+    if damping is None and np.any(matrices.damping):
+        damping = matrices.damping
+    structure = LinearizedStructure(matrices.mass, matrices.stiffness, damping, rows, coordinates=basis)
     return structure, contacts
 
 
@@ -153,8 +152,8 @@ def _has_first_order(mbs: Any, item: Mapping[str, Any]) -> bool:
 
 
 def _contact_objects(mbs: Any) -> list[Any]:
-    """Indices of the active contacts; raises for one that is not a unilateral spring of one coordinate."""
-    found = []
+    """Return the indices of active contacts; raise for one that is not a unilateral spring of one coordinate."""
+    indices = []
     for i in range(mbs.systemData.NumberOfObjects()):
         index = exu.ObjectIndex(i)
         item = mbs.GetObject(index)
@@ -165,8 +164,8 @@ def _contact_objects(mbs: Any) -> list[Any]:
                 f"contact {item['name']!r}: got Object{item['objectType']}, need ObjectContactCoordinate"
             )
         _check_law(item)
-        found.append(index)
-    return found
+        indices.append(index)
+    return indices
 
 
 def _check_law(item: Mapping[str, Any]) -> None:
@@ -179,8 +178,8 @@ def _check_law(item: Mapping[str, Any]) -> None:
 
 
 @contextmanager
-def _inactive(mbs: Any, objects: list[Any]) -> Iterator[None]:
-    """Switch the contacts off and, whatever happens, on again."""
+def _without_contacts(mbs: Any, objects: list[Any]) -> Iterator[None]:
+    """Switch the contacts off; they are restored in any case."""
     try:
         for index in objects:
             mbs.SetObjectParameter(index, "activeConnector", False)
@@ -191,7 +190,7 @@ def _inactive(mbs: Any, objects: list[Any]) -> Iterator[None]:
 
 
 def _check_equilibrium(mbs: Any, stiffness: np.ndarray, basis: np.ndarray) -> None:
-    unbalanced = np.abs(basis @ (basis.T @ forces(mbs)))  # what constraint forces cannot balance
+    unbalanced = np.abs(basis @ (basis.T @ forces(mbs)))  # by constraint forces
     elastic = np.max(np.abs(stiffness) @ np.abs(basis.T @ mbs.systemData.GetODE2Coordinates()))
     if np.max(unbalanced) > EQUILIBRIUM * elastic + PICOMETRE * np.max(np.abs(stiffness)):
         raise MultiPhiValueError(

@@ -1,8 +1,8 @@
-"""A linear structure that knows the Exudyn coordinates it came from.
+"""Linearized structure: a linear structure with its relation to the coordinates of an Exudyn system.
 
     q = q_0 + S z
 
-q [m, rad, ...] are the system's ODE2 coordinates, q_0 those where it was linearised, S a basis of the directions that
+q [m, rad, ...] are the system's ODE2 coordinates, q_0 those of the linearised state, S a basis of the directions that
 its constraints leave free (orthonormal columns), z the coordinates of the structure.
 """
 
@@ -22,11 +22,11 @@ __all__ = ["LinearizedStructure"]
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class LinearizedStructure(LinearStructure):
-    """A linear structure that knows the Exudyn coordinates it came from.
+    """A linear structure with its relation to the coordinates of an Exudyn system.
 
         q = q_0 + S z
 
-    It is a LinearStructure in z, made by ``linear_structure_from`` and ``reduce``. S^T S is the identity, so a matrix A
+    It is a LinearStructure in z, from ``linear_structure_from`` or ``reduce``. S^T S is the identity, so a matrix A
     in z acts in Exudyn's coordinates as S A S^T.
 
     Attributes
@@ -34,13 +34,13 @@ class LinearizedStructure(LinearStructure):
     mass, stiffness : array (n, n)
         M [kg, kg m2] and K [N/m, N m] in z.
     damping : array (n, n), ModalDamping, RayleighDamping or None
-        C [N s/m, N m s] in z, or how it is made.
+        C [N s/m, N m s] in z, or its definition by ratios.
     points : mapping of str to array (n,)
         Displacements of markers and coordinates from q_0, as rows in z.
     dofs : None
         Rows in z have no nodes.
     free : array (n,)
-        0 to n - 1: nothing is fixed beside the system's constraints.
+        0 to n - 1: nothing is fixed but by the system's constraints.
     coordinates : array (n_full, n)
         S; a copy, read-only.
 

@@ -1,11 +1,12 @@
-"""Directions in which a linearised system is moved by what pushes it; a model may be without the others, and says so.
+"""Moved directions: those in which forces can move a linearised system; a model may leave out the others.
 
     span Q = span (P, A P, A A P, ...) for A = K and A = C, in coordinates of unit mass
 
 A mass on a compressed spring is unstable sideways, and a body that spins about one axis has gyroscopic forces about the
-others; neither moves in these directions as long as nothing pushes it there, in Exudyn's own run too. Pushes P (n, k)
-[N, N m] are what can: forces, momenta, contacts, loads. All in the coordinates z (n,) of the free directions; the
-search is one in the modes of the symmetric part of K, in which round-off of a stiff mode does not reach a soft one.
+others. Neither moves in these directions without a force there, in Exudyn's own run too. P (n, k) [N, N m] are all
+possible forces: present forces, momenta, contacts and loads, in the coordinates z (n,) of the free directions. The
+Krylov space is computed in the modes of the symmetric part of K, where round-off of a stiff mode does not affect a soft
+one.
 """
 
 from __future__ import annotations
@@ -15,49 +16,49 @@ import scipy.linalg
 
 __all__ = ["moved_directions"]
 
-IDLE = 1e-7  # of a vector, or of the largest of C or of omega^2: what differentiating leaves of it where there is none
-RIGID = 1e-12  # of the largest omega^2: one that is round-off
+NEGLIGIBLE = 1e-7  # of a vector, or of the largest of C or omega^2: error of numerical differentiation
+RIGID = 1e-12  # of the largest omega^2: a smaller one is round-off
 ROUND_OFF = 1e-12  # of a unit direction
 
 
 def moved_directions(
-    mass: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, pushes: np.ndarray
+    mass: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, forces: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Q (n, m), orthonormal, and U (n, n - m) of unit mass, Q.M U = 0; None if every direction is moved, or none.
+    """Q (n, m), orthonormal, and U (n, n - m) of unit mass, Q.M U = 0; None if all directions are moved, or none.
 
-    pushes (k, n).
+    forces (k, n): P^T.
     """
     squares, shapes = scipy.linalg.eigh((stiffness + stiffness.T) / 2, mass)
     fastest = float(np.max(np.abs(squares)))
     squares = np.where(np.abs(squares) <= RIGID * fastest, 0.0, squares)
-    turning, damped = shapes.T @ (stiffness - stiffness.T) @ shapes / 2, shapes.T @ damping @ shapes
+    skew, modal_damping = shapes.T @ (stiffness - stiffness.T) @ shapes / 2, shapes.T @ damping @ shapes
     systems = [
-        np.diag(squares) + _without(turning, IDLE * fastest),
-        _without(damped, IDLE * float(np.max(np.abs(damped), initial=0.0))),
+        np.diag(squares) + _drop_small(skew, NEGLIGIBLE * fastest),
+        _drop_small(modal_damping, NEGLIGIBLE * float(np.max(np.abs(modal_damping), initial=0.0))),
     ]
-    found, tried = np.zeros((len(mass), 0)), shapes.T @ pushes.T
-    while tried.shape[1] and found.shape[1] < len(mass):
-        new = _beside(found, tried)
-        found, tried = np.hstack([found, new]), np.hstack([system @ new for system in systems])
-    if found.shape[1] in (0, len(mass)):
+    moved, candidates = np.zeros((len(mass), 0)), shapes.T @ forces.T
+    while candidates.shape[1] and moved.shape[1] < len(mass):
+        new = _new_directions(moved, candidates)
+        moved, candidates = np.hstack([moved, new]), np.hstack([system @ new for system in systems])
+    if moved.shape[1] in (0, len(mass)):
         return None
-    others = shapes @ scipy.linalg.null_space(found.T)
+    others = shapes @ scipy.linalg.null_space(moved.T)
     return scipy.linalg.null_space((mass @ others).T), others
 
 
-def _without(values: np.ndarray, smallest: float) -> np.ndarray:
+def _drop_small(values: np.ndarray, smallest: float) -> np.ndarray:
     return np.where(np.abs(values) > smallest, values, 0.0)
 
 
-def _beside(found: np.ndarray, tried: np.ndarray) -> np.ndarray:
-    """Orthonormal directions (n, k) of the columns tried that those found, orthonormal too, lack."""
-    new = found[:, :0]
-    for given in tried.T:
-        known, size = np.hstack([found, new]), float(np.linalg.norm(given))
-        column = _without(given, IDLE * size)
-        left = column - known @ (known.T @ column)
-        left -= known @ (known.T @ left)
-        rest = float(np.linalg.norm(left))
-        if rest > IDLE * size:
-            new = np.hstack([new, _without(left / rest, ROUND_OFF)[:, None]])
+def _new_directions(basis: np.ndarray, candidates: np.ndarray) -> np.ndarray:
+    """Orthonormal directions (n, k) of the candidates' columns that are independent of an orthonormal basis."""
+    new = basis[:, :0]
+    for candidate in candidates.T:
+        present, size = np.hstack([basis, new]), float(np.linalg.norm(candidate))
+        column = _drop_small(candidate, NEGLIGIBLE * size)
+        independent = column - present @ (present.T @ column)
+        independent -= present @ (present.T @ independent)
+        length = float(np.linalg.norm(independent))
+        if length > NEGLIGIBLE * size:
+            new = np.hstack([new, _drop_small(independent / length, ROUND_OFF)[:, None]])
     return new

@@ -1,4 +1,4 @@
-"""Points of an Exudyn system as rows: by which its markers and nodes follow its coordinates.
+"""Points of an Exudyn system as rows: derivatives of its markers and nodes by its coordinates.
 
     displacement of a point = row . (q - q_0) = row S . z
 
@@ -16,12 +16,12 @@ from exudyn.advancedUtilities import NumericalJacobian
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 
-__all__ = ["coordinate_row", "default_points", "gap_row", "given_points"]
+__all__ = ["coordinate_row", "default_points", "gap_row", "requested_points"]
 
-HELD = 1e-9  # of a row's largest entry before projection: a point that moves less is held by constraints
+HELD = 1e-9  # of a row's largest entry before projection: a smaller row is a point that constraints fix
 
 _AXES = ("x", "y", "z")
-_VELOCITIES = {"initialVelocities", "initialCoordinates_t"}  # what only a node with ODE2 coordinates has
+_VELOCITIES = {"initialVelocities", "initialCoordinates_t"}  # parameters of nodes with ODE2 coordinates only
 
 
 def coordinate_row(mbs: Any, marker: Any) -> np.ndarray:
@@ -30,10 +30,10 @@ def coordinate_row(mbs: Any, marker: Any) -> np.ndarray:
 
 
 def gap_row(mbs: Any, index: Any) -> np.ndarray:
-    """Row (n_full,) by which the gap of a contact of spheres follows the coordinates at the current state."""
-    every = range(len(mbs.systemData.GetODE2Coordinates()))
+    """Row (n_full,) of the gap of a contact of spheres, its derivative at the current state."""
+    indices = range(len(mbs.systemData.GetODE2Coordinates()))
     gap = exu.OutputVariableType.DisplacementLocal
-    return np.asarray(NumericalJacobian(mbs, lambda: np.atleast_1d(mbs.GetObjectOutput(index, gap)), every)[0])
+    return np.asarray(NumericalJacobian(mbs, lambda: np.atleast_1d(mbs.GetObjectOutput(index, gap)), indices)[0])
 
 
 def default_points(mbs: Any, basis: np.ndarray) -> dict[str, np.ndarray]:
@@ -42,17 +42,17 @@ def default_points(mbs: Any, basis: np.ndarray) -> dict[str, np.ndarray]:
     for i in range(mbs.systemData.NumberOfMarkers()):
         marker = exu.MarkerIndex(i)
         try:
-            found = _marker_rows(mbs, mbs.GetMarker(marker)["name"], marker)
+            marker_rows = _marker_rows(mbs, mbs.GetMarker(marker)["name"], marker)
         except MultiPhiError:  # a marker without position or coordinates names no point
             continue
-        _add(rows, found)
+        _add(rows, marker_rows)
     for i in range(mbs.systemData.NumberOfNodes()):
         _add(rows, _node_rows(mbs, exu.NodeIndex(i)))
     return {name: row @ basis for name, row in rows.items() if _moves(row, basis)}
 
 
-def _add(rows: dict[str, np.ndarray], found: Mapping[str, np.ndarray]) -> None:
-    for name, row in found.items():
+def _add(rows: dict[str, np.ndarray], new: Mapping[str, np.ndarray]) -> None:
+    for name, row in new.items():
         if name in rows:
             raise MultiPhiValueError(
                 f"points: got two markers or nodes that give a point {name!r}, need names of your own, points={{...}}"
@@ -60,27 +60,27 @@ def _add(rows: dict[str, np.ndarray], found: Mapping[str, np.ndarray]) -> None:
         rows[name] = row
 
 
-def given_points(mbs: Any, points: Mapping[str, Any], basis: np.ndarray) -> dict[str, np.ndarray]:
-    """Rows (n,) of the points asked for; raises MultiPhiValueError or MultiPhiTypeError for one that there is not."""
+def requested_points(mbs: Any, points: Mapping[str, Any], basis: np.ndarray) -> dict[str, np.ndarray]:
+    """Rows (n,) of requested points; raise MultiPhiValueError or MultiPhiTypeError for one that does not exist."""
     if not isinstance(points, Mapping):
         needed = "{name: marker index or (node index, coordinate number)}"
         raise MultiPhiTypeError(f"points: got {type(points).__name__}, need {needed}")
     rows: dict[str, np.ndarray] = {}
-    for name, given in points.items():
-        _add(rows, _given_rows(mbs, name, given))
+    for name, place in points.items():
+        _add(rows, _requested_rows(mbs, name, place))
     return {name: row @ basis for name, row in rows.items()}
 
 
-def _given_rows(mbs: Any, name: str, given: Any) -> dict[str, np.ndarray]:
-    if isinstance(given, tuple):
-        return {name: _node_coordinate_row(mbs, name, *given)}
-    if not isinstance(given, (int, np.integer, exu.MarkerIndex)):
+def _requested_rows(mbs: Any, name: str, place: Any) -> dict[str, np.ndarray]:
+    if isinstance(place, tuple):
+        return {name: _node_coordinate_row(mbs, name, *place)}
+    if not isinstance(place, (int, np.integer, exu.MarkerIndex)):
         raise MultiPhiTypeError(
-            f"points[{name!r}]: got {given!r}, need a marker index or (node index, coordinate number)"
+            f"points[{name!r}]: got {place!r}, need a marker index or (node index, coordinate number)"
         )
-    if not 0 <= int(given) < mbs.systemData.NumberOfMarkers():
-        raise MultiPhiValueError(f"points[{name!r}]: got marker {int(given)}, need one that exists")
-    return _marker_rows(mbs, name, exu.MarkerIndex(int(given)))
+    if not 0 <= int(place) < mbs.systemData.NumberOfMarkers():
+        raise MultiPhiValueError(f"points[{name!r}]: got marker {int(place)}, need one that exists")
+    return _marker_rows(mbs, name, exu.MarkerIndex(int(place)))
 
 
 def _node_coordinate_row(mbs: Any, name: str, node: Any, coordinate: int) -> np.ndarray:
@@ -100,7 +100,7 @@ def _node_rows(mbs: Any, node: Any) -> dict[str, np.ndarray]:
 
 
 def _marker_rows(mbs: Any, name: str, marker: Any) -> dict[str, np.ndarray]:
-    """Rows by which a marker's coordinates, or else its position, follow the coordinates, (n_full,) each."""
+    """Rows (n_full,) of a marker's coordinates, or else of its position."""
     if mbs.GetMarker(marker)["markerType"] == "NodeCoordinate":
         return {name: _node_coordinate_marker_row(mbs, marker)}
     outputs = exu.OutputVariableType
@@ -123,9 +123,9 @@ def _node_coordinate_marker_row(mbs: Any, marker: Any) -> np.ndarray:
 
 
 def _derivative(mbs: Any, marker: Any, variable: Any) -> np.ndarray:
-    """Central differences of a marker's output by the ODE2 coordinates, (values, n_full)."""
-    every = range(len(mbs.systemData.GetODE2Coordinates()))
-    return NumericalJacobian(mbs, lambda: mbs.GetMarkerOutput(marker, variable), every)
+    """Derivatives (values, n_full) of a marker's output by the ODE2 coordinates, by central differences."""
+    indices = range(len(mbs.systemData.GetODE2Coordinates()))
+    return NumericalJacobian(mbs, lambda: mbs.GetMarkerOutput(marker, variable), indices)
 
 
 def _moves(row: np.ndarray, basis: np.ndarray) -> bool:

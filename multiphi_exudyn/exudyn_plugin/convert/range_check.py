@@ -1,4 +1,4 @@
-"""What a check of the linear range finds: how far a reduced motion left it, when, and how to say so."""
+"""Range check: error of the linearisation in a reduced motion, at several times, with its warnings."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from multiphi_exudyn.display import per_cent
 
 __all__ = ["LAG", "TOLERANCE", "RangeCheck"]
 
-TOLERANCE = 0.01  # error from which a motion has left the range: a pendulum that swings by 1.1 degrees has it
-LAG = 0.017  # rad: shift of oscillations until the end of a run from which it is told; an error of 1 % of the run
+TOLERANCE = 0.01  # limit of the error: that of a pendulum with an amplitude of 1.1 degrees
+LAG = 0.017  # rad: limit of the phase shift of oscillations at the end of a run, with an error of 1 % over the run
 
 
 @dataclass(frozen=True)
 class RangeCheck:
-    """How far a reduced motion left the range in which the linearisation of its Exudyn system holds.
+    """Error of the linearisation of an Exudyn system in a reduced motion.
 
-    Made by ``Reduction.check``: at a few instants the system is asked for its accelerations in the model's motion.
+    Returned by ``Reduction.check``, which evaluates the system's accelerations in the model's motion at a few times.
 
     Attributes
     ----------
     times : array (k,)
-        When it was asked [s].
+        Times of the evaluations [s].
     errors : array (k,)
-        How far what the model leaves out moves it, relative to the motion's largest displacement.
+        Displacement by what the model leaves out, relative to the motion's largest displacement.
     reason : str
-        Why nothing could be checked; empty where it could.
+        Why nothing could be checked; empty if it could.
     lag : float
-        By how much [rad], about, errors that repeat in every oscillation shift it until the end of the run.
+        Estimated phase shift [rad] at the end of the run, by errors that repeat in every oscillation.
     softest : float
-        The lowest stiffness per mass [1/s2] in the mean of the motion, if it is negative, of directions that the model
-        is without because nothing moves the system there; else 0.
+        Lowest stiffness per mass [1/s2] in the mean of the motion, in directions that the model leaves out because
+        nothing moves the system there, if it is negative; else 0.
 
     Examples
     --------
@@ -76,17 +76,17 @@ class RangeCheck:
 
     @property
     def error(self) -> float:
-        """The largest error, nan where nothing could be checked."""
+        """Largest error, nan if nothing could be checked."""
         return math.nan if self.reason else float(np.max(self.errors, initial=0.0))
 
     @property
     def holds(self) -> bool:
-        """Whether the motion stayed within the linear range; False where nothing could be checked."""
+        """Whether the motion stayed within the linear range; False if nothing could be checked."""
         return self.error <= TOLERANCE and self.lag <= LAG
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What a user must not miss."""
+        """Warnings, a sentence each; empty if the motion stayed within the linear range."""
         if self.reason:
             return (f"linear range: not checked, {self.reason}",)
         if self.holds:
@@ -96,9 +96,9 @@ class RangeCheck:
                 f"linear range: what the model leaves out of its Exudyn system is small ({per_cent(self.error)}), but "
                 f"shifts frequencies: at the end of the run the phase is off by some {self.lag:.1g} rad",
             )
-        found = self.times[np.argmax(self.errors > TOLERANCE)]
-        away = per_cent(self.error) if self.error < 1 else "more than 100 %"
+        time = self.times[np.argmax(self.errors > TOLERANCE)]
+        error = per_cent(self.error) if self.error < 1 else "more than 100 %"
         return (
-            f"linear range: left by t = {found:.3g} s; what the model leaves out of its Exudyn system moves it by "
-            f"{away} of the largest displacement; make the motion smaller, or solve the Exudyn system itself",
+            f"linear range: left by t = {time:.3g} s; what the model leaves out of its Exudyn system moves it by "
+            f"{error} of the largest displacement; make the motion smaller, or solve the Exudyn system itself",
         )

@@ -4,10 +4,10 @@
 
 q_0, v_0 are the current coordinates and velocities, f [N, N m] the forces there without contacts, limit stops,
 friction and loads by user functions, S the directions the constraints leave free. Points are displacements from q_0. p
-is a constant load: a state out of balance starts to move as the system does. K holds what constraint forces and weights
-give (geometric_stiffness.py). A load by a function of time is a FunctionLoad, t = 0 being the system's current time,
-and so is what changes with time of the force of an ObjectGenericODE2. What is no part of the model is in ``left_out``,
-with the reason.
+is a constant load: a state out of balance starts to move as the system does. K includes the geometric stiffness of
+constraint forces and weights (geometric_stiffness.py). A load by a function of time is a FunctionLoad, with t = 0 at
+the system's current time, and so is the change with time of the force of an ObjectGenericODE2. Items that the model
+does not contain are in ``left_out``, with the reason.
 
 Exudyn's contact dampers pull at separation; those of the model do not (contact.py).
 """
@@ -23,7 +23,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.convert.contacts import contact_distance, contacts_of, spheres_of
 from multiphi_exudyn.exudyn_plugin.convert.frictions import frictions_of
-from multiphi_exudyn.exudyn_plugin.convert.full_system import initial_is_current, items_of, smooth
+from multiphi_exudyn.exudyn_plugin.convert.full_system import initial_is_current, items_of, without_contacts
 from multiphi_exudyn.exudyn_plugin.convert.item_fates import (
     grouped,
     left_out_directions,
@@ -38,7 +38,7 @@ from multiphi_exudyn.exudyn_plugin.convert.items import Item, has_contact, user_
 from multiphi_exudyn.exudyn_plugin.convert.linear_range import LinearRange
 from multiphi_exudyn.exudyn_plugin.convert.linearize import check_system
 from multiphi_exudyn.exudyn_plugin.convert.linearized_structure import LinearizedStructure
-from multiphi_exudyn.exudyn_plugin.convert.point_rows import default_points, given_points
+from multiphi_exudyn.exudyn_plugin.convert.point_rows import default_points, requested_points
 from multiphi_exudyn.exudyn_plugin.convert.reduction import Reduction
 from multiphi_exudyn.exudyn_plugin.convert.system_matrices import linearised
 from multiphi_exudyn.exudyn_plugin.convert.timed_loads import TimedLoad, function_loads, timed_forces, timed_loads
@@ -52,8 +52,8 @@ from multiphi_exudyn.mechanics.static_loads import ConstantLoad
 
 __all__ = ["reduce"]
 
-SMALL = 100  # coordinates up to which all modes are kept unless told: a run then has the accuracy of the system's own
-HELD = 1e-9  # of a row's largest entry before projection: a contact that moves less is held by constraints
+SMALL = 100  # coordinates up to which all modes are kept by default: a run then has the accuracy of the system's own
+HELD = 1e-9  # of a row's largest entry before projection: a smaller row is a contact whose gap constraints fix
 
 
 def reduce(
@@ -75,28 +75,28 @@ def reduce(
     ``<object>.upper`` and ``<object>.lower``; friction is that of the latter where it is the law of ``mp.Friction``,
     with the object's name.
 
-    Where the system is unstable, or its matrices are not symmetric, for the sake of directions in which nothing of it
-    moves it, neither speeds nor forces, contacts or loads, all these directions are left out: put loads on the system
-    before, which a model without them could not take there.
+    If the system is unstable, or its matrices are not symmetric, because of directions in which nothing moves it
+    (neither velocities nor forces, contacts or loads), these directions are left out. Apply loads to the system before
+    the reduction: a load in these directions cannot be added to the model later.
 
     Parameters
     ----------
     mbs : exudyn.MainSystem
         Assembled.
     modes : int, "all", UpTo, Tolerance or None, default None
-        Of every level, as in MultiPhiModel; a number that the system does not have means all of them. None: all up to
-        100, else chosen from static responses.
+        Modes of every level, as in MultiPhiModel; a number larger than the system has means all. None: all up to 100,
+        else chosen from static responses.
     points : mapping, default None
         As of ``linear_structure_from``: name to marker index, or to (node index, coordinate number); None for all.
     damping : array (n, n), ModalDamping, RayleighDamping or None, default None
         In the coordinates z, or by ratios; None takes what the system's own dampers give.
     strict : bool, default False
-        Whether to refuse a system of which something is left out, instead of a warning of every run.
+        Whether to refuse a system of which parts would be left out, instead of a warning in every run.
 
     Returns
     -------
     Reduction
-        The model, its start and loads, and what was taken and left out.
+        The model, its start and loads, and the items it contains and leaves out.
 
     Raises
     ------
@@ -148,45 +148,45 @@ def reduce(
         ]
         full_contacts += [friction for friction in frictions.values() if isinstance(friction, Friction)]
         full_rows = {c.name: np.asarray(c.direction) for c in full_contacts}
-        with smooth(mbs, objects, loads):
+        with without_contacts(mbs, objects, loads):
             varying, forces = timed_loads(mbs, loads, now), timed_forces(mbs, objects, now)
             timed = {i: load for i, load in varying.items() if isinstance(load, TimedLoad)}
-            acting = (*timed.values(), *forces.values())
-            linear = linearised(mbs, now, [*full_rows.values(), *(row for load in acting for row in load.rows)])
-        rows = default_points(mbs, linear.basis) if points is None else given_points(mbs, points, linear.basis)
-    own = linear.damping if np.any(linear.damping) else None
-    given = own if damping is None else damping
-    structure = LinearizedStructure(linear.mass, linear.stiffness, given, rows, coordinates=linear.basis)
-    contacts = [replace(c, direction=_projected(full_rows[c.name], linear.basis)) for c in full_contacts]
+            time_loads = (*timed.values(), *forces.values())
+            linear = linearised(mbs, now, [*full_rows.values(), *(row for load in time_loads for row in load.rows)])
+        rows = default_points(mbs, linear.basis) if points is None else requested_points(mbs, points, linear.basis)
+    if damping is None and np.any(linear.damping):
+        damping = linear.damping
+    structure = LinearizedStructure(linear.mass, linear.stiffness, damping, rows, coordinates=linear.basis)
+    contacts = [replace(c, direction=_project(full_rows[c.name], linear.basis)) for c in full_contacts]
     moving = [c for c in contacts if np.any(structure.row(c.direction))]
     names = {c.name for c in moving}
-    taken = (*_acting(taken_objects(objects, names), forces), *_taken_loads(loads, timed))
+    taken = (*_with_time_change(taken_objects(objects, names), forces), *_taken_loads(loads, timed))
     left_out = (
         *left_out_objects(objects, names, {i: reason for i, reason in frictions.items() if isinstance(reason, str)}),
         *((load_item(i, loads[i]), reason) for i, reason in varying.items() if isinstance(reason, str)),
         *left_out_functions(mbs),
     )
-    idle = () if linear.idle is None else tuple(left_out_directions(linear.idle.of))
-    missing = [*missing_parts(left_out), *grouped(idle)]
+    unmoved = () if linear.unmoved is None else tuple(left_out_directions(linear.unmoved.reason))
+    missing = [*missing_parts(left_out), *grouped(unmoved)]
     if strict and missing:
         raise MultiPhiValueError(f"mbs: got what a reduction leaves out ({'; '.join(missing)}), need strict=False")
     linear = replace(linear, contacts={name: full_rows[name] for name in names}, loads=timed, forces=forces)
     linear = replace(linear, spheres=spheres_of(mbs, objects, names))
-    validity = LinearRange(mbs, linear, missing, linearised_functions(left_out), grouped(idle))
+    validity = LinearRange(mbs, linear, missing, linearised_functions(left_out), grouped(unmoved))
     return Reduction(
         MultiPhiModel(structure, moving, _modes(modes, structure.n - len(moving)), validity=validity),
         linear.basis.T @ linear.velocity,
         (
             *([ConstantLoad(linear.static, 1.0)] if np.any(linear.static) else []),
-            *(each for load in acting for each in function_loads(load, linear.basis)),
+            *(each for load in time_loads for each in function_loads(load, linear.basis)),
         ),
         taken,
-        (*left_out, *idle),
+        (*left_out, *unmoved),
         linear.symmetrised,
     )
 
 
-def _acting(items: Iterator[Item], forces: Mapping[int, TimedLoad]) -> Iterator[Item]:
+def _with_time_change(items: Iterator[Item], forces: Mapping[int, TimedLoad]) -> Iterator[Item]:
     for item in items:
         also = "; how its force changes with time" if item.index in forces else ""
         yield replace(item, became=f"{item.became}{also}")
@@ -197,8 +197,8 @@ def _taken_loads(loads: list[dict[str, Any]], timed: Mapping[int, TimedLoad]) ->
         if i in timed:
             yield load_item(i, load, "load by its function of time")
         elif not user_function(load):
-            held = " in its present direction" if load.get("bodyFixed", False) else ""
-            yield load_item(i, load, f"constant load{held}")
+            direction = " in its present direction" if load.get("bodyFixed", False) else ""
+            yield load_item(i, load, f"constant load{direction}")
 
 
 def _modes(modes: int | str | UpTo | Tolerance | None, most: int) -> int | str | UpTo | Tolerance | None:
@@ -207,7 +207,7 @@ def _modes(modes: int | str | UpTo | Tolerance | None, most: int) -> int | str |
     return "all" if isinstance(modes, int) and modes > most else modes
 
 
-def _projected(row: np.ndarray, basis: np.ndarray) -> np.ndarray:
-    """A row in z; zero if constraints hold it."""
+def _project(row: np.ndarray, basis: np.ndarray) -> np.ndarray:
+    """A row in z; zero if constraints fix it."""
     projected: np.ndarray = row @ basis
     return projected if np.max(np.abs(projected)) > HELD * np.max(np.abs(row), initial=1.0) else 0 * projected

@@ -1,4 +1,4 @@
-"""What ``reduce`` makes of an Exudyn system: the model, its start and loads, and what was taken and left out."""
+"""Reduction of an Exudyn system: the model, its start and loads, and the items it contains and leaves out."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["Reduction"]
 
 @dataclass(frozen=True, repr=False)
 class Reduction(Shown):
-    """What ``reduce`` made of an Exudyn system.
+    """Result of ``reduce`` for an Exudyn system.
 
     Attributes
     ----------
@@ -35,10 +35,10 @@ class Reduction(Shown):
     taken : tuple of Item
         Every item of the system that is part of the model.
     left_out : tuple of (Item, str)
-        What is no part of it, with the reason.
+        Items that are not part of it, with the reason.
     symmetrised : tuple of str
-        Matrices that were not symmetric, by how much and between which coordinates; their symmetric part is taken, and
-        what the other part does is found by ``check``.
+        Matrices that were not symmetric, by how much and between which coordinates. The model has their symmetric part;
+        ``check`` determines the effect of the skew part.
 
     Examples
     --------
@@ -99,23 +99,25 @@ class Reduction(Shown):
 
     @property
     def report(self) -> str:
-        """What was taken and what was left out, items of one type and one fate a line."""
+        """Text with the items taken and left out, one line for items of one type and one fate."""
         frictions = sum(contact.held for contact in self.model.contacts)
         elements = f"contacts: {len(self.model.contacts) - frictions}, frictions: {frictions}"
         size = f"{self.structure.n} degrees of freedom, {elements}, modes: {self.model.modes}"
         taken = [f"  {line}" for line in grouped((item, item.became) for item in self.taken)]
         left = [f"  {line}" for line in grouped(self.left_out)]
-        made = ["made symmetric", *(f"  {sentence}" for sentence in self.symmetrised)] if self.symmetrised else []
-        return "\n".join([size, "taken", *taken, *made, "left out", *(left or ["  nothing"])])
+        symmetrised = (
+            ["made symmetric", *(f"  {sentence}" for sentence in self.symmetrised)] if self.symmetrised else []
+        )
+        return "\n".join([size, "taken", *taken, *symmetrised, "left out", *(left or ["  nothing"])])
 
     def check(self, trajectory: Trajectory) -> RangeCheck:
-        """How far a trajectory of this model left the linear range; its warnings say so too."""
+        """Error of the linearisation in a trajectory of this model; the trajectory's warnings contain it too."""
         validity = self.model.validity
         assert isinstance(validity, (LinearRange, LinearLimits))
         return validity.check(trajectory)
 
     def report_of(self, trajectory: Trajectory, tolerance: float = 0.01) -> str:
-        """How far a trajectory of this model can be trusted, a line each: linear range, horizon, warnings.
+        """Text about the accuracy of a trajectory of this model, a line each for linear range, horizon and warnings.
 
         Parameters
         ----------
@@ -124,11 +126,11 @@ class Reduction(Shown):
         tolerance : float, default 0.01
             Of the horizon, see ``Trajectory.horizon``.
         """
-        found = self.check(trajectory)
-        missed = f"what the model leaves out moves it by {per_cent(found.error)} of its largest displacement"
-        held, horizon = "holds" if found.holds else "does not hold", trajectory.horizon(tolerance)
+        check = self.check(trajectory)
+        error = f"what the model leaves out moves it by {per_cent(check.error)} of its largest displacement"
+        verdict, horizon = "holds" if check.holds else "does not hold", trajectory.horizon(tolerance)
         lines = [
-            f"linear range ({held}): {f'not checked, {found.reason}' if found.reason else missed}",
+            f"linear range ({verdict}): {f'not checked, {check.reason}' if check.reason else error}",
             f"horizon: determined within {100 * tolerance:g} % until {horizon:.6g} s of {trajectory.t_end:g} s",
         ]
         return "\n".join([*lines, *(f"warning: {sentence}" for sentence in trajectory.warnings)])

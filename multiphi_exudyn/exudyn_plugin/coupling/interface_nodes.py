@@ -1,15 +1,15 @@
-"""Interface nodes: the nodes of an Exudyn system by which points of a body are offered to it.
+"""Interface nodes: nodes of an Exudyn system that represent points of a body.
 
     y = R q + c,   y the coordinates of the node: displacements [m] from its position, and angles [rad]
 
 One coordinate is a NodeGenericODE2. A position is a NodePoint2D or a NodePoint, whose coordinates are displacements in
-global directions; markers of positions, and with them springs, distance and spherical joints, attach. A rigid interface
-is a NodeRigidBody2D or a NodeRigidBodyRxyz; markers of rigid bodies, and with them every joint, attach. The nodes have
-no mass, and their coordinates are linear in q; what is large in the system around them is not.
+global directions; it takes markers of positions, and with them springs, distance and spherical joints. A rigid
+interface is a NodeRigidBody2D or a NodeRigidBodyRxyz; it takes markers of rigid bodies, and with them every joint. The
+nodes have no mass, and their coordinates are linear in q; the system around them may move by large displacements.
 
-The angles of a NodeRigidBodyRxyz are turned by one after the other, about the node's x, y and z axis. As long as they
-are small they are the components of one rotation, which is what a linear structure knows; at 5 degrees about two axes
-the two differ by 0.004 rad. The power of what acts on the node is that on the modes at any angle, for p = R^T f.
+The angles of a NodeRigidBodyRxyz are successive rotations about the node's x, y and z axis. Small ones are the
+components of one rotation, as in a linear structure; at 5 degrees about two axes the difference is 0.004 rad. At any
+angle, forces on the node have the same power as their modal forces p = R^T f.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from multiphi_exudyn.mechanics.structure import At, LinearStructure
 
 __all__ = ["InterfaceNode", "InterfacePoint", "PositionInterface", "RigidInterface", "interface_nodes"]
 
-TURN = math.radians(5.0)  # rad: from there on a rigid interface has turned further than a linear body can
+TURN = math.radians(5.0)  # rad: limit of the rotation of a rigid interface, as the body is linear
 ROTATIONS = {2: 1, 3: 3}  # by the number of directions: about z in a plane, about x, y and z in space
 
 
@@ -36,23 +36,23 @@ ROTATIONS = {2: 1, 3: 3}  # by the number of directions: about z in a plane, abo
 class PositionInterface:
     """A point of a body as a position of the Exudyn system, to which markers of positions attach.
 
-    Given to a body by name, ``items = CreateMultiPhiBody(mbs, model, interface={"tip": PositionInterface(...)})``; its
+    A body takes it by name, ``items = CreateMultiPhiBody(mbs, model, interface={"tip": PositionInterface(...)})``; the
     node is then ``items["nInterface"]["tip"]``, for MarkerNodePosition.
 
     Parameters
     ----------
     position : sequence of float
-        Where it is without displacement [m]: two numbers in a plane system, three in space.
+        Position without displacement [m]: two numbers in a plane system, three in space.
     displacements : sequence of str, mapping, array (n,) or None
-        What moves it in each of these directions: a point name, {point: coefficient} or a row; None where the structure
-        does not move.
+        Displacement in each of these directions: a point name, {point: coefficient} or a row; None for a direction in
+        which it does not move.
 
     Raises
     ------
     MultiPhiTypeError
-        Where it is used, for arguments of another kind.
+        By ``CreateMultiPhiBody``, for arguments of another kind.
     MultiPhiValueError
-        Where it is used, for another number of directions, and points that there are not.
+        By ``CreateMultiPhiBody``, for another number of directions, and points that do not exist.
 
     Examples
     --------
@@ -68,29 +68,29 @@ class PositionInterface:
 
 @dataclass(frozen=True)
 class RigidInterface:
-    """A place of a body as a rigid frame of the Exudyn system, to which every joint attaches.
+    """A point of a body as a rigid frame of the Exudyn system, to which every joint attaches.
 
-    Given to a body by name, ``items = CreateMultiPhiBody(mbs, model, interface={"tip": RigidInterface(...)})``; its
+    A body takes it by name, ``items = CreateMultiPhiBody(mbs, model, interface={"tip": RigidInterface(...)})``; the
     node is then ``items["nInterface"]["tip"]``, for MarkerNodeRigid.
 
-    A body is linear: a run in which a rigid interface turns by more than 5 degrees issues a warning.
+    A body is linear: a run in which a rigid interface rotates by more than 5 degrees issues a warning.
 
     Parameters
     ----------
     position : sequence of float
-        Where it is without displacement [m]: two numbers in a plane system, three in space.
+        Position without displacement [m]: two numbers in a plane system, three in space.
     displacements : sequence of str, mapping, array (n,) or None
-        What moves it in each of these directions: a point name, {point: coefficient} or a row; None where the structure
-        does not move.
+        Displacement in each of these directions: a point name, {point: coefficient} or a row; None for a direction in
+        which it does not move.
     rotations : sequence of str, mapping, array (n,) or None
-        What turns it [rad]: about z in a plane system, about x, y and z in space.
+        Rotations [rad]: about z in a plane system, about x, y and z in space.
 
     Raises
     ------
     MultiPhiTypeError
-        Where it is used, for arguments of another kind.
+        By ``CreateMultiPhiBody``, for arguments of another kind.
     MultiPhiValueError
-        Where it is used, for another number of directions, and points that there are not.
+        By ``CreateMultiPhiBody``, for another number of directions, and points that do not exist.
 
     Examples
     --------
@@ -110,17 +110,20 @@ InterfacePoint: TypeAlias = "At | PositionInterface | RigidInterface"
 
 @dataclass(frozen=True)
 class InterfaceNode:
-    """name; rows (k, n) of its coordinates; position (2 or 3,) [m], none of a single coordinate; angles: of the k."""
+    """Node of an interface, with rows (k, n) of its coordinates, of which the last ``angles`` are rotations.
+
+    position: (2 or 3,) [m], empty for a single coordinate.
+    """
 
     name: str
     rows: np.ndarray
     position: tuple[float, ...] = ()
     angles: int = 0
 
-    def item(self, name: str, start: np.ndarray, start_t: np.ndarray, look: Mapping[str, Any]) -> Any:
-        """Exudyn's node with coordinates and velocities (k,) at the start; look: show and color."""
-        places = [*self.position, *[0.0] * self.angles]
-        if not places:
+    def item(self, name: str, start: np.ndarray, start_t: np.ndarray, visualization: Mapping[str, Any]) -> Any:
+        """Exudyn's node with initial coordinates and velocities (k,); visualization: show and color."""
+        reference = [*self.position, *[0.0] * self.angles]
+        if not reference:
             return NodeGenericODE2(
                 name=name,
                 referenceCoordinates=[0.0],
@@ -129,21 +132,21 @@ class InterfaceNode:
                 numberOfODE2Coordinates=1,
             )
         kind: Any = _KINDS[len(self.position), self.angles]
-        found = kind(name=name, referenceCoordinates=places, initialCoordinates=start, initialVelocities=start_t)
-        found.visualization = {**found.visualization, **look}
-        return found
+        node = kind(name=name, referenceCoordinates=reference, initialCoordinates=start, initialVelocities=start_t)
+        node.visualization = {**node.visualization, **visualization}
+        return node
 
 
 _KINDS = {(2, 0): NodePoint2D, (3, 0): NodePoint, (2, 1): NodeRigidBody2D, (3, 3): NodeRigidBodyRxyz}
 
 
 def interface_nodes(
-    structure: LinearStructure, given: Iterable[str] | Mapping[str, InterfacePoint]
+    structure: LinearStructure, interface: Iterable[str] | Mapping[str, InterfacePoint]
 ) -> tuple[InterfaceNode, ...]:
     """Interface nodes from names of points, or {name: point, row, PositionInterface or RigidInterface}."""
-    if isinstance(given, str) or not isinstance(given, Iterable):
-        raise MultiPhiTypeError(f"interface: got {given!r}, need names of points, or {{name: point or row}}")
-    points = dict(given) if isinstance(given, Mapping) else {name: name for name in given}
+    if isinstance(interface, str) or not isinstance(interface, Iterable):
+        raise MultiPhiTypeError(f"interface: got {interface!r}, need names of points, or {{name: point or row}}")
+    points = dict(interface) if isinstance(interface, Mapping) else {name: name for name in interface}
     for name in points:
         if not isinstance(name, str):
             raise MultiPhiTypeError(f"interface: got {name!r}, need a name")
@@ -177,9 +180,9 @@ def _position(name: str, point: PositionInterface | RigidInterface) -> tuple[flo
     return tuple(place.tolist())
 
 
-def _entries(name: str, given: Any, count: int) -> list[At | None]:
-    if isinstance(given, (str, Mapping)) or not isinstance(given, Sequence):
-        raise MultiPhiTypeError(f"{name}: got {given!r}, need a sequence of points, rows or None")
-    if len(given) != count:
-        raise MultiPhiValueError(f"{name}: got {len(given)} entries, need {count} for its position")
-    return list(given)
+def _entries(name: str, entries: Any, count: int) -> list[At | None]:
+    if isinstance(entries, (str, Mapping)) or not isinstance(entries, Sequence):
+        raise MultiPhiTypeError(f"{name}: got {entries!r}, need a sequence of points, rows or None")
+    if len(entries) != count:
+        raise MultiPhiValueError(f"{name}: got {len(entries)} entries, need {count} for its position")
+    return list(entries)

@@ -1,19 +1,19 @@
-"""A level as a time integration takes it: plain, or with its modes matched to the step.
+"""Stepped level: the equations of a level for a time integration, plain or with modes matched to the step.
 
     M q'' + D q' + K q = p + drive,   q = eta, padded to the body's size with coordinates that stay zero
 
-Plain: M = I, D = Phi^T C Phi, K = diag(omega^2), q' = eta'. A growing mode has omega^2 < 0 in either. Where contacts
-slide friction adds its own to D and K, which are then not symmetric (levels/sliding.py).
+Plain: M = I, D = Phi^T C Phi, K = diag(omega^2), q' = eta'. A growing mode has omega^2 < 0 in both forms. Friction of
+sliding contacts adds to D and K, which are then not symmetric (levels/sliding.py).
 
-Matched to the step h: the trapezoidal rule turns exp(h s) into (1 + h s/2) / (1 - h s/2), so it is exact for
-z = (eta, eta') if it is given, instead of z' = A z + B p,
+Matched to the step h: the trapezoidal rule replaces exp(h s) by (1 + h s/2) / (1 - h s/2). So it is exact for
+z = (eta, eta') if it integrates, instead of z' = A z + B p, the equation z' = A_h z + B_h p with
 
     A_h = (2/h) tanh(A h/2) = (2/h) (E + I)^-1 (E - I),   B_h = (2/h) (E + I)^-1 Gamma
     E = exp(A h),   Gamma = integral_0^h exp(A t) dt B
 
-exactly also under a constant modal force p. With the first block rows [Q V] of A_h and G of B_h as a new velocity
-q' = Q eta + V eta' + G p this is again of second order, its static stiffness is K itself, and for a mode without
-damping M = (omega h/2)^2 / tan(omega h/2)^2 and D = 0. The damping need not be diagonal. Needs |omega| h < pi.
+also under a constant modal force p. With the first block rows [Q V] of A_h and G of B_h as a new velocity
+q' = Q eta + V eta' + G p this is again an equation of second order. Its static stiffness is K itself, and for a mode
+without damping M = (omega h/2)^2 / tan(omega h/2)^2 and D = 0. The damping need not be diagonal. Needs |omega| h < pi.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ __all__ = ["SteppedLevel"]
 
 @dataclass(frozen=True)
 class SteppedLevel:
-    """See the module's docstring. All matrices (s, s), s >= r the size of the body.
+    """Equations of motion of a level for a solver; all matrices (s, s), s >= r the size of the body.
 
-    Coordinates beyond the level's r modes are never excited; they have the frequency of its highest one.
-    loaded: the level. mass, damping, stiffness: for the solver. own_damping: D of the plain level. squares: omega^2
-    (s,). drive: (s,).
-    from_displacement, from_velocity, from_force: Q, V, G. step: h [s], or None.
+    Coordinates beyond the level's r modes are never excited; they have the frequency of its highest mode.
+    loaded: the level. step: h [s] its modes are matched to, or None. mass, damping, stiffness: for the solver.
+    modal_damping: D of the plain level. squares: omega^2 (s,). drive: constant force (s,) on modes of zero frequency.
+    from_displacement, from_velocity, from_force: Q, V, G.
     """
 
     loaded: LoadedLevel
@@ -46,7 +46,7 @@ class SteppedLevel:
     mass: np.ndarray
     damping: np.ndarray
     stiffness: np.ndarray
-    own_damping: np.ndarray
+    modal_damping: np.ndarray
     squares: np.ndarray
     drive: np.ndarray
     from_displacement: np.ndarray
@@ -55,7 +55,7 @@ class SteppedLevel:
 
     @classmethod
     def of(cls, loaded: LoadedLevel, size: int, step: float | None) -> SteppedLevel:
-        """A level matched to ``step`` [s], or plain for None."""
+        """The equations of a level with modes matched to ``step`` [s], or plain for None."""
         level = loaded.modal
         squares, damping = np.full(size, np.max(level.squares, initial=0.0)), np.zeros((size, size))
         squares[: level.modes] = level.squares
@@ -70,7 +70,7 @@ class SteppedLevel:
 
     @property
     def states(self) -> tuple[int, ...]:
-        """The number of every element's state."""
+        """State number of every element."""
         return self.loaded.states
 
     @property
@@ -85,62 +85,62 @@ class SteppedLevel:
 
     def acceleration(self, q: np.ndarray, q_t: np.ndarray, force: np.ndarray) -> np.ndarray:
         """q'' (s,) under a modal force."""
-        return self._mass_inverse @ (force - self.resisting(q, q_t))
+        return self._mass_inverse @ (force - self.internal_force(q, q_t))
 
-    def resisting(self, q: np.ndarray, q_t: np.ndarray) -> np.ndarray:
-        """D q' + K q - drive (s,)."""
+    def internal_force(self, q: np.ndarray, q_t: np.ndarray) -> np.ndarray:
+        """Internal force D q' + K q - drive (s,)."""
         return self.damping.dot(q_t) + self.stiffness.dot(q) - self.drive
 
     def velocity(self, q: np.ndarray, q_t: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """eta' (s,) of a state in the solver under a modal force."""
-        shown = q_t - self.from_displacement.dot(q) - self.from_force.dot(force + self.drive)
-        return self._velocity_inverse.dot(shown)
+        """Modal velocity eta' (s,) of a solver's state q, q' (s,) under a modal force (s,)."""
+        difference = q_t - self.from_displacement.dot(q) - self.from_force.dot(force + self.drive)
+        return self._velocity_inverse.dot(difference)
 
-    def state(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, ...]:
-        """q, q', q'' (s,) of eta, eta' (r,) under a modal force (s,); behind eta may stand what links hold."""
+    def solver_state(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, ...]:
+        """q, q', q'' (s,) of eta, eta' (r,) under a modal force (s,); stick positions after eta are ignored."""
         r, s = self.modes, self.size
-        given = np.zeros(3 * s)
-        given[:r], given[s : s + r], given[2 * s :] = eta[:r], eta_t[:r], force + self.drive
-        moved = self._rates.dot(given)
-        return given[:s], moved[:s], moved[s:]
+        modal = np.zeros(3 * s)
+        modal[:r], modal[s : s + r], modal[2 * s :] = eta[:r], eta_t[:r], force + self.drive
+        rates = self._rates.dot(modal)
+        return modal[:s], rates[:s], rates[s:]
 
-    def shown(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """(q, q', q'') (k, 3 s) of eta, eta' (k, r) under modal forces (k, s); behind eta as in ``state``."""
-        found = np.zeros((len(eta), 3 * self.size))
+    def solver_states(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """(q, q', q'') (k, 3 s) of eta, eta' (k, r) under modal forces (k, s), as in ``solver_state``."""
+        states = np.zeros((len(eta), 3 * self.size))
         s = self.size
-        q, q_t, q_tt = found[:, :s], found[:, s : 2 * s], found[:, 2 * s :]
+        q, q_t, q_tt = states[:, :s], states[:, s : 2 * s], states[:, 2 * s :]
         v, r = np.zeros_like(q), self.modes
         q[:, :r], v[:, :r] = eta[:, :r], eta_t[:, :r]
         q_t[:] = q @ self.from_displacement.T + v @ self.from_velocity.T + (force + self.drive) @ self.from_force.T
         q_tt[:] = (force + self.drive - q_t @ self.damping.T - q @ self.stiffness.T) @ self._mass_inverse.T
-        return found
+        return states
 
     @functools.cached_property
-    def outside(self) -> np.ndarray:
-        """The matrix (s, 3 s + 1) from (q, q', q'', 1) to the modal force p, by the equation of motion."""
-        return np.hstack([self._total, -self.drive[:, None]])
+    def external_force_matrix(self) -> np.ndarray:
+        """Matrix (s, 3 s + 1) from (q, q', q'', 1) to the external modal force p, by the equation of motion."""
+        return np.hstack([self._equation_matrix, -self.drive[:, None]])
 
     @functools.cached_property
-    def physical(self) -> np.ndarray:
-        """The matrix (3 s, 3 s) from (q, q', q'') to (eta, eta', eta''), whatever force acts."""
+    def to_physical(self) -> np.ndarray:
+        """Matrix (3 s, 3 s) from (q, q', q'') to (eta, eta', eta''), for any force."""
         identity, none = np.eye(self.size), np.zeros((self.size, self.size))
-        shown = np.hstack([-self.from_displacement, identity, none]) - self.from_force @ self._total
-        velocity = self._velocity_inverse @ shown
-        acceleration = self._total - self.own_damping @ velocity
+        difference = np.hstack([-self.from_displacement, identity, none]) - self.from_force @ self._equation_matrix
+        velocity = self._velocity_inverse @ difference
+        acceleration = self._equation_matrix - self.modal_damping @ velocity
         acceleration[:, : self.size] -= self.stiffness
         return np.vstack([np.hstack([identity, none, none]), velocity, acceleration])
 
     @functools.cached_property
     def _rates(self) -> np.ndarray:
-        """The matrix (2 s, 3 s) from eta, eta' and the whole modal force to (q', q'')."""
+        """Matrix (2 s, 3 s) from eta, eta' and the total modal force to (q', q'')."""
         velocity = np.hstack([self.from_displacement, self.from_velocity, self.from_force])
-        resisting = self.damping @ velocity
-        resisting[:, : self.size] += self.stiffness
-        resisting[:, 2 * self.size :] -= np.eye(self.size)
-        return np.vstack([velocity, -self._mass_inverse @ resisting])
+        internal_force = self.damping @ velocity
+        internal_force[:, : self.size] += self.stiffness
+        internal_force[:, 2 * self.size :] -= np.eye(self.size)
+        return np.vstack([velocity, -self._mass_inverse @ internal_force])
 
     @functools.cached_property
-    def _total(self) -> np.ndarray:
+    def _equation_matrix(self) -> np.ndarray:
         return np.hstack([self.stiffness, self.damping, self.mass])
 
     @functools.cached_property
@@ -169,23 +169,23 @@ def _matched(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, st
             "period of the kept modes"
         )
     s, identity = len(squares), np.eye(len(squares))
-    scale = np.where(omega > 0, omega, 1 / step)  # both halves of z alike
+    scale = np.where(omega > 0, omega, 1 / step)  # displacements and velocities of one size
     system = np.zeros((3 * s, 3 * s))
     system[:s, s : 2 * s] = np.diag(scale)
     system[s : 2 * s, :s] = -stiffness / scale
     system[s : 2 * s, s : 2 * s] = -damping
     system[s : 2 * s, 2 * s :] = identity
-    flow = scipy.linalg.expm(system * step)[: 2 * s]
-    turned = np.linalg.solve(flow[:, : 2 * s] + np.eye(2 * s), flow - np.eye(2 * s, 3 * s)) * (2 / step)
-    turned[:, :s] *= scale
-    turned[:s] /= scale[:, None]
-    return _second_order(turned, s)
+    transition = scipy.linalg.expm(system * step)[: 2 * s]
+    rule = np.linalg.solve(transition[:, : 2 * s] + np.eye(2 * s), transition - np.eye(2 * s, 3 * s)) * (2 / step)
+    rule[:, :s] *= scale
+    rule[:s] /= scale[:, None]
+    return _second_order(rule, s)
 
 
-def _second_order(turned: np.ndarray, s: int) -> Maps:
+def _second_order(rule: np.ndarray, s: int) -> Maps:
     """M, D, Q, V, G from [A_h B_h] (2 s, 3 s)."""
-    (q, v, g), (_, lower, forced) = np.hsplit(turned[:s], 3), np.hsplit(turned[s:], 3)
+    (q, v, g), (_, lower, input_matrix) = np.hsplit(rule[:s], 3), np.hsplit(rule[s:], 3)
     inverse = np.linalg.inv(v)
-    mass = np.linalg.inv(v @ (forced - lower @ inverse @ g))
+    mass = np.linalg.inv(v @ (input_matrix - lower @ inverse @ g))
     damping = -mass @ (q + v @ lower @ inverse)
     return mass, damping, q, v, g
