@@ -4,56 +4,44 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.force_law import ForceLaw
-from multiphi_exudyn.study.comparison.compare import Comparison
-from multiphi_exudyn.study.comparison.contact_totals import LISTED
+from multiphi_exudyn.study.comparison.beam_places import coefficients
+from multiphi_exudyn.study.comparison.compare import LISTED, Comparison
 from multiphi_exudyn.study.comparison.pages import sentences
-from multiphi_exudyn.study.comparison.placement import meeting
-from multiphi_exudyn.study.comparison.warned import warned
+from multiphi_exudyn.study.comparison.run_warnings import run_warnings
 from multiphi_exudyn.study.comparison.wording import engineering
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.scene_laws import described_laws
 from multiphi_exudyn.study.scene.scene_loads import described_loads
 
-__all__ = ["Findings", "findings"]
+__all__ = ["comparison_warnings", "findings"]
 
 TEMPLATE = "findings.txt.j2"
 HONEST = 0.01  # NRMSE that the headline's model holds, where any does and the reference can tell
 GONE = 0.05  # NRMSE above which a pointwise comparison says little
 
 
-@dataclass(frozen=True)
-class Findings:
-    """compared and outcome: one sentence or two each. key_figures: (what, how much, from what)."""
-
-    compared: str
-    outcome: str
-    distrust: tuple[str, ...]
-    key_figures: tuple[tuple[str, ...], ...]
-
-
-def findings(comparison: Comparison) -> Findings:
-    """The report's first lines, from the comparison's numbers."""
+def findings(comparison: Comparison) -> dict[str, tuple[str, ...]]:
+    """Sentences: compared, outcome, distrust; and key_figures, each "what | how much | from what"."""
+    bench, file = comparison.bench, comparison.bench.scene.file
     cheapest = [run for run in comparison.cheapest if run.ok]
-    told = sentences(
+    return sentences(
         __package__ or "",
         TEMPLATE,
         ("compared", "outcome", "distrust", "key_figures"),
         comparison=comparison,
-        bench=comparison.bench,
+        bench=bench,
         until=comparison.headline_window,
-        start=comparison.bench.scene.file.start,
-        loads=described_loads(comparison.bench.scene),
-        laws=described_laws(comparison.bench.scene),
-        contacts=comparison.bench.mechanics.contacts,
+        start=file.start,
+        loads=described_loads(bench.scene),
+        laws=described_laws(bench.scene),
+        contacts=bench.mechanics.contacts,
         listed_one_by_one=LISTED,
-        meeting=meeting,
+        meeting=coefficients,
         gap=_gap,
         stiffness=_stiffness,
         headline=_headline_runs(comparison),
@@ -61,14 +49,19 @@ def findings(comparison: Comparison) -> Findings:
         failed=[run for run in comparison.runs.values() if not run.ok],
         cheapest=cheapest,
         cheapest_worst=max(cheapest, key=lambda run: _error(comparison, run), default=None),
-        own=_own(comparison),
+        own=comparison.coarser,
         early=_separated(comparison),
         left=dict(_left(comparison)),
         twins=list(_twins(comparison)),
-        warned=warned(comparison),
+        warned=comparison_warnings(comparison),
     )
-    rows = tuple(tuple(row.split(" | ")) for row in told["key_figures"])
-    return Findings(" ".join(told["compared"]), " ".join(told["outcome"]), told["distrust"], rows)
+
+
+def comparison_warnings(comparison: Comparison) -> list[str]:
+    """What the models say of their own answers, a sentence each."""
+    runs = comparison.runs.items()
+    horizons = [(name, run.horizon_s) for name, run in runs]
+    return run_warnings([(name, run.warnings) for name, run in runs], horizons, comparison.bench.t_end)
 
 
 def _gap(contacts: Sequence[UnilateralContact]) -> str:
@@ -91,12 +84,6 @@ def _error(comparison: Comparison, run: ModelRun) -> float:
     return comparison.worst_error(run, comparison.headline_window) if known else math.inf
 
 
-def _own(comparison: Comparison) -> ModelRun | None:
-    """The reference's coarser copy, if it can be measured."""
-    own = comparison.coarser
-    return own if own is not None and own.name in comparison.measured else None
-
-
 def _headline_runs(comparison: Comparison) -> list[ModelRun]:
     """Of each kind the fastest accurate one, or else the most accurate; then the scene's first, if it is another."""
     runs = [best for kind in ("reduced", "user-object") if (best := _honest(comparison, kind)) is not None]
@@ -105,13 +92,13 @@ def _headline_runs(comparison: Comparison) -> list[ModelRun]:
 
 
 def _honest(comparison: Comparison, kind: str) -> ModelRun | None:
-    runs = [run for run in comparison.measured.values() if run.kind == kind]
-    own = _own(comparison)
+    errors = {run.name: _error(comparison, run) for run in comparison.measured.values() if run.kind == kind}
+    own = comparison.coarser
     floor = max(HONEST, _error(comparison, own) if own is not None else 0.0)
-    accurate = [run for run in runs if _error(comparison, run) <= floor]
+    accurate = [comparison.runs[name] for name, error in errors.items() if error <= floor]
     if accurate:
         return min(accurate, key=lambda run: run.online_s)
-    return min(runs, key=lambda run: _error(comparison, run), default=None)
+    return comparison.runs[min(errors, key=lambda name: errors[name])] if errors else None
 
 
 def _most_accurate(comparison: Comparison) -> ModelRun | None:
@@ -123,27 +110,21 @@ def _most_accurate(comparison: Comparison) -> ModelRun | None:
 
 def _separated(comparison: Comparison) -> dict[str, float]:
     """Until when [s] the headline's runs and the coarser copy follow the reference, of those that leave it."""
-    own = _own(comparison)
-    runs = [*_headline_runs(comparison), *([own] if own is not None else [])]
+    runs = [run for run in (*_headline_runs(comparison), comparison.coarser) if run is not None]
     ends = {run.name: comparison.horizon(run, GONE) for run in runs}
     return {name: end for name, end in ends.items() if end < comparison.bench.t_end}
 
 
 def _left(comparison: Comparison) -> Iterator[tuple[str, tuple[float, float]]]:
-    """The force laws whose span the reference leaves, and what it reaches [mm]."""
-    for law in comparison.bench.mechanics.force_laws:
-        reached = _reached(comparison, law)
-        if len(reached) and not law.knots[0] <= np.min(reached) <= np.max(reached) <= law.knots[-1]:
-            yield law.name, (1e3 * float(np.min(reached)), 1e3 * float(np.max(reached)))
-
-
-def _reached(comparison: Comparison, law: ForceLaw) -> np.ndarray:
-    """q (k,) [m] of the reference; empty where it failed or not all of the law's points are recorded."""
-    places: dict[str, float] = {law.at: 1.0} if isinstance(law.at, str) else dict(law.at)
+    """The force laws whose span the reference leaves, and what it reaches [mm]; it has recorded all their points."""
     points = comparison.reference.points
-    if not all(name in points for name in places):
-        return np.empty(0)
-    return np.sum([factor * points[name] for name, factor in places.items()], axis=0)
+    for law in comparison.bench.mechanics.force_laws:
+        places: dict[str, float] = {law.at: 1.0} if isinstance(law.at, str) else dict(law.at)
+        if places.keys() <= points.keys():
+            reached = sum(factor * points[name] for name, factor in places.items())
+            lowest, highest = float(np.min(reached)), float(np.max(reached))
+            if not law.knots[0] <= lowest <= highest <= law.knots[-1]:
+                yield law.name, (1e3 * lowest, 1e3 * highest)
 
 
 def _twins(comparison: Comparison) -> Iterator[tuple[ModelRun, ModelRun, float]]:
