@@ -29,7 +29,7 @@ LINE_LENGTH = 48  # characters of a title
 STRIP = (1.015, 0.035)  # bottom and height, in heights of the axes
 
 
-@rc_context(STYLE | {"axes.grid": False, "axes.titlelocation": "center", "legend.facecolor": "#7C7B78"})
+@rc_context(STYLE | {"axes.grid": False, "axes.titlelocation": "center", "legend.facecolor": "#00224E"})
 def map_figure(pairs: Sequence[MapPair]) -> Figure:
     """The maps of one reduced model."""
     figure = Figure(figsize=(WIDTH, 2.7 * len(pairs) + 1.0))

@@ -115,6 +115,7 @@ def error_time_figure(comparison: Comparison) -> Figure:
     figure, (axes,) = panels([5.0])
     until, style = comparison.headline_window, styles(comparison)
     axes.set(xscale="log", yscale="log", xlabel="online time")
+    axes.margins(0.12)
     for name, run in comparison.measured.items():
         label = None if run in comparison.cheapest[1:] else run.label
         axes.plot(run.online_s, 100 * comparison.worst_error(run, until), **style[name].marks, label=label)
@@ -128,7 +129,6 @@ def error_time_figure(comparison: Comparison) -> Figure:
             comparison.reference.online_s, color=REFERENCE, ls="--", lw=1, label="online time of the reference"
         )
     axes.set_ylabel(f"NRMSE to {until:g} s\nworst of {', '.join(comparison.bench.judged_points)}")
-    axes.margins(x=0.12)
     percent_axis(axes.yaxis)
     seconds_axis(axes.xaxis)
     legend_below(figure, [axes], columns=2)
