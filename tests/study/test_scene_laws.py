@@ -187,11 +187,11 @@ class TestReport:
         short = CUBIC | {"span": [-0.005, 0.005]}
         comparison = compared(tmp_path, with_laws(short, models=[MODELS[0], MODELS[0] | {"name": "r6", "modes": 6}]))
         told = findings(comparison)
-        assert "; on it acts the force law spring at tip (50 N/m q +2e+06 N/m³ q³)" in told["compared"][0]
-        followed, left = (line for line in told["distrust"] if "force law spring" in line)
+        assert "On it acts the force law spring at tip (50 N/m q +2e+06 N/m³ q³)" in told["compared"][0]
+        (followed,) = (line for line in told["distrust"] if "force law spring" in line)
         law = comparison.bench.mechanics.force_laws[0]
         assert f"by {len(law.slopes)} straight segments from -5 to 5 mm, to {percent(law.error)} of" in followed
-        assert "leaves the span of the force law spring (-5 to 5 mm): it reaches" in left
+        assert "leaves the span of the force law spring (-5 to 5 mm): it reaches" in followed
         assert comparison.runs["r6"].label == "Multi-Phi, levels of force laws, r = 6"
         page = render(comparison, level_modes(comparison), loss_tables(comparison.bench))
         assert "Without the force laws" in page

@@ -66,7 +66,7 @@ class StudyResult:
     def runs(self) -> pd.DataFrame:
         """A line for each run of the error pass.
 
-        key: of its setting. at, setting, nearby: field -> value. error: NaN without. cause: why there is none, or empty.
+        key: of its setting. at, setting, nearby: field -> value. error: NaN without. cause: why there is none, or "".
         measures: all of them, by name.
         """
         lines = [

@@ -13,6 +13,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -83,8 +84,7 @@ def stage_of(scene: Scene, model: str | None = None, reference: str | None = Non
     Raises MultiPhiValueError, one line, for a model that cannot be drawn, matrices, and no or endless length.
     """
     models = _chosen(scene, model, reference)
-    comparison = scene.file.comparison.model_copy(update={"reference": models[1]})
-    scene = replace(scene, file=scene.file.model_copy(update={"comparison": comparison}))
+    scene = _changed(scene, comparison=scene.file.comparison.model_copy(update={"reference": models[1]}))
     mechanics = mechanics_of(scene)
     beams = mechanics.beams
     if beams is None:
@@ -96,11 +96,15 @@ def stage_of(scene: Scene, model: str | None = None, reference: str | None = Non
     judged = scene.file.outputs.judged_points or scene.file.outputs.points or mechanics.points
     touched = [point for contact in mechanics.contacts for point in coefficients(contact)]
     shown = tuple(dict.fromkeys([*judged, *touched, *(point for _, points in nodes.values() for point in points)]))
-    outputs = scene.file.outputs.model_copy(update={"points": shown})
-    scene = replace(scene, file=scene.file.model_copy(update={"outputs": outputs}))
+    scene = _changed(scene, outputs=scene.file.outputs.model_copy(update={"points": shown}))
     bench = replace(prepare(scene, replace(mechanics, beams=replace(beams, parts=parts))), repeats=1)
-    factor = _checked(slow, bench.t_end) if slow is not None else _slow_motion(bench)
-    return Stage(bench, models, tuple(judged), nodes, factor)
+    return Stage(
+        bench, models, tuple(judged), nodes, _slow_motion(bench) if slow is None else _checked(slow, bench.t_end)
+    )
+
+
+def _changed(scene: Scene, **fields: Any) -> Scene:
+    return replace(scene, file=scene.file.model_copy(update=fields))
 
 
 def gif(stage: Stage, runs: Mapping[str, ModelRun], drawn: Callable[[], object] = lambda: None) -> bytes:
@@ -118,7 +122,7 @@ def gif(stage: Stage, runs: Mapping[str, ModelRun], drawn: Callable[[], object] 
 
 
 class _FewColours(PillowWriter):
-    """Frames with one palette of few colours: a file a tenth as large."""
+    """Frames with one palette of few colours: a file a quarter as large."""
 
     _frames: list[Image.Image]
 
@@ -139,9 +143,14 @@ def moving_figure(stage: Stage, runs: Mapping[str, ModelRun]) -> tuple[Figure, M
     figure, axes = panels([*[2.6] * len(stage.beams), 2.3])
     moves: list[Move] = []
     for run, colour, width in ((reference, REFERENCE, WIDTHS[1]), (reduced, COLOURS[0], WIDTHS[0])):
-        for beam, panel in zip(stage.beams, axes, strict=False):
-            moves += [_beam(stage, run, beam, panel, colour, width), *_stops(stage, run, beam, panel, 2 * width)]
-        moves.append(_history(stage, run, axes[-1], colour, width / 2))
+        for (beam, (x, nodes)), panel in zip(stage.beams.items(), axes, strict=False):
+            (line,) = panel.plot(x, x, color=colour, lw=width, label=run.name)
+            moves += [_shape(line, np.array([stage.at(run, node) for node in nodes]))]
+            moves += _stops(stage, run, beam, panel, 2 * width)
+        values = stage.at(run, _followed(stage, run))
+        axes[-1].plot(stage.time, values, color=OPEN, lw=width / 2, zorder=0)
+        (line,) = axes[-1].plot([], [], color=colour, lw=width / 2, marker="o", ms=width, markevery=[-1])
+        moves.append(_history(line, stage.time, values))
     _frame(stage, runs, figure, axes)
     clock = axes[-1].set_title("", fontsize=10, loc="right")
     figure.draw_without_rendering()
@@ -155,11 +164,12 @@ def moving_figure(stage: Stage, runs: Mapping[str, ModelRun]) -> tuple[Figure, M
     return figure, move
 
 
-def _beam(stage: Stage, run: ModelRun, beam: str, axes: Axes, colour: str, width: float) -> Move:
-    x, nodes = stage.beams[beam]
-    deflection = np.array([stage.at(run, node) for node in nodes])
-    (line,) = axes.plot(x, deflection[:, 0], color=colour, lw=width, label=run.name)
+def _shape(line: Line2D, deflection: np.ndarray) -> Move:
     return lambda frame: line.set_ydata(deflection[:, frame])
+
+
+def _history(line: Line2D, time: np.ndarray, values: np.ndarray) -> Move:
+    return lambda frame: line.set_data(time[: frame + 1], values[: frame + 1])
 
 
 def _stops(stage: Stage, run: ModelRun, beam: str, axes: Axes, size: float) -> Iterator[Move]:
@@ -168,28 +178,19 @@ def _stops(stage: Stage, run: ModelRun, beam: str, axes: Axes, size: float) -> I
     assert beams is not None, "checked when the stage was built"
     for contact in stage.bench.mechanics.contacts:
         closed = _closed(run.contact_intervals[contact.name], stage.time)
+        gap = 1e3 * np.interp(stage.time, run.time, run.gaps[contact.name])
         for point, c in coefficients(contact).items():
             name, along = beams.points[point]
             if name == beam:
-                gap = np.interp(stage.time, run.time, run.gaps[contact.name])
-                z = stage.at(run, point) - 1e3 * gap / c
-                (mark,) = axes.plot([along], z[:1], marker="^" if c > 0 else "v", ms=size, ls="none", zorder=3)
-                yield _marked(mark, z, closed)
+                (mark,) = axes.plot([along], [0], marker="^" if c > 0 else "v", ms=size, ls="none", zorder=3)
+                yield _stop(mark, stage.at(run, point) - gap / c, closed)
 
 
-def _marked(mark: Line2D, z: np.ndarray, closed: np.ndarray) -> Move:
+def _stop(mark: Line2D, z: np.ndarray, closed: np.ndarray) -> Move:
     def move(frame: int) -> None:
-        mark.set_ydata(z[frame : frame + 1])
-        mark.set_color(CLOSED if closed[frame] else OPEN)
+        mark.set(ydata=z[frame : frame + 1], color=CLOSED if closed[frame] else OPEN)
 
     return move
-
-
-def _history(stage: Stage, run: ModelRun, axes: Axes, colour: str, width: float) -> Move:
-    values = stage.at(run, _followed(stage, run))
-    axes.plot(stage.time, values, color=OPEN, lw=width, zorder=0)
-    (line,) = axes.plot([], [], color=colour, lw=width, marker="o", ms=2 * width, markevery=[-1])
-    return lambda frame: line.set_data(stage.time[: frame + 1], values[: frame + 1])
 
 
 def _frame(stage: Stage, runs: Mapping[str, ModelRun], figure: Figure, axes: list[Axes]) -> None:

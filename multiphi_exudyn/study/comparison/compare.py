@@ -6,6 +6,7 @@ written to disk.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -82,6 +83,11 @@ class Comparison:
         """NRMSE of a point to the reference from 0 to ``until`` [s]."""
         return metrics.nrmse(run.points[point], self.reference.points[point], run.time, until)
 
+    def errors(self, run: ModelRun) -> dict[str, dict[str, float | None]]:
+        """NRMSE by window and point."""
+        error = functools.partial(self.error, run)
+        return metrics.by_window(self.bench.windows, self.bench.points, error)
+
     def worst_error(self, run: ModelRun, until: float) -> float:
         """Largest NRMSE of the judged points."""
         return max(self.error(run, point, until) for point in self.bench.judged_points)
@@ -157,7 +163,7 @@ def compare(
 def summary(comparison: Comparison) -> dict[str, Any]:
     """The content of summary.json; numbers that do not exist are None. With friction it has ``stick_intervals``."""
     bench, runs, measured = comparison.bench, comparison.runs, comparison.measured
-    errors = {name: _errors(comparison, run) for name, run in measured.items()}
+    errors = {name: comparison.errors(run) for name, run in measured.items()}
     own = comparison.coarser
     content = {
         "scene": _scene(comparison),
@@ -239,11 +245,4 @@ def _row(comparison: Comparison, run: ModelRun) -> dict[str, Any]:
         "impulse_Ns": run.impulse,
         "warnings": run.warnings,
         "horizon_s": run.horizon_s,
-    }
-
-
-def _errors(comparison: Comparison, run: ModelRun) -> dict[str, dict[str, float]]:
-    return {
-        f"{until:g}": {point: comparison.error(run, point, until) for point in comparison.bench.points}
-        for until in comparison.bench.windows
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import pandas as pd
 
@@ -111,29 +111,25 @@ def _errors(comparison: Comparison) -> pd.DataFrame:
     def until(given: float | None) -> str:
         return "–" if given is None else "whole run" if given >= ROUND_OFF * end else f"{given:.3f} s"
 
-    def line(run: ModelRun) -> dict[tuple[str, str], str]:
-        errors = _by_window(comparison, lambda point, window: comparison.error(run, point, window))
+    lines = {}
+    for name, run in comparison.measured.items():
         agreement = {("agreement horizon", share(each)): until(comparison.horizon(run, each)) for each in tolerances}
         nudged = {each: until(run.horizon_s.get(each)) for each in comparison.nudged}
         own = {("sensitivity horizon", share(float(each))): told for each, told in nudged.items()}
-        return errors | agreement | own
-
-    return pd.DataFrame({name: line(run) for name, run in comparison.measured.items()}).T
+        lines[name] = _by_window(comparison.errors(run)) | agreement | own
+    return pd.DataFrame(lines).T
 
 
 def _stiff_errors(comparison: Comparison, stiff: StiffStops) -> pd.DataFrame:
     """Of rigid levels against stiff stops, and the stiff stops' own."""
-
-    def line(run: ModelRun) -> dict[tuple[str, str], str]:
-        return _by_window(comparison, lambda point, window: stiff.error(run, (point,), window))
-
-    own = _by_window(comparison, lambda point, window: stiff.uncertainty(comparison.bench.time, (point,), window))
-    return pd.DataFrame({name: line(run) for name, run in comparison.rigid.items()} | {"own uncertainty": own}).T
+    values = stiff.values(comparison.bench, comparison.rigid)
+    tables = values["errors"] | {"own uncertainty": values["uncertainty"]}
+    return pd.DataFrame({name: _by_window(table) for name, table in tables.items()}).T
 
 
-def _by_window(comparison: Comparison, measure: Callable[[str, float], float]) -> dict[tuple[str, str], str]:
-    bench = comparison.bench
-    return {(f"to {end:g} s", point): percent(measure(point, end)) for end in bench.windows for point in bench.points}
+def _by_window(table: Mapping[str, Mapping[str, float | None]]) -> dict[tuple[str, str], str]:
+    """In words, as columns."""
+    return {(f"to {end} s", point): percent(error) for end, errors in table.items() for point, error in errors.items()}
 
 
 def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterator[tuple[str, Picture]]:
