@@ -10,6 +10,7 @@ from multiphi_exudyn import MultiPhiValueError
 from multiphi_exudyn.study.accuracy.analysis import points, settings, settings_at, stiff_errors, uncertainty
 from multiphi_exudyn.study.accuracy.cases import CASE, load_study, shipped_studies
 from multiphi_exudyn.study.accuracy.study import run_study
+from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.workbench import prepare
 from multiphi_exudyn.study.sweep.executors import open_executor
@@ -48,6 +49,12 @@ SCENE = BEAM | {
     "models": [{"kind": "reduced", "name": "all", "modes": "all"}, {"kind": "reduced", "name": "r12", "modes": 12}],
     "comparison": {"reference": "all", "coarser": "r12"},
 }
+
+
+def at_rest(bench, name, progress, horizon=False):
+    """A run in which nothing moves."""
+    points = {point: np.zeros(len(bench.time)) for point in bench.points}
+    return ModelRun(name, bench.scene.models[name].kind, name, time=bench.time, points=points)
 
 
 @pytest.fixture
@@ -242,6 +249,16 @@ class TestRunning:
         assert failed.error.isna().all()
         assert failed.message.str.startswith("failed: ").all()
         assert settings(result).query("method == 'levels'").error.notna().all()
+
+    def test_a_setting_that_is_none_at_a_later_point_is_a_gap_with_its_cause(self, store, monkeypatch):
+        """Levels with printed frequencies are rigid: at that parameter set the compliant ones are refused."""
+        monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.run_model", at_rest)
+        monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.stiff_stops", lambda bench: None)
+        study = load_study("sets", quick=True)
+        result = run_study(study, store, progress=False)
+        refused = {row.parameters["method"] for row in result.rows if "printed frequencies" in row.message}
+        assert refused == {"Multi-Phi, compliant levels"}
+        assert settings_at(result, study.points[-1]).message.str.startswith("failed: ").any()
 
     def test_rigid_levels_are_measured_against_a_stiff_stop_too_and_nothing_else_is(
         self, study_file, store, monkeypatch

@@ -10,12 +10,14 @@ was; maps are made anew with every report.
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Any
 
+from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.study.accuracy.analysis import most_accurate
 from multiphi_exudyn.study.accuracy.budget import budget
@@ -128,10 +130,17 @@ def _stored(store: Store, case: Parameters) -> ModelRun | None:
 
 
 def _stiff(study: Study, cases: Sequence[Parameters], store: Store) -> StiffStops | None:
-    """What rigid levels at one point of the axes are measured against too; None where no case with any is left."""
+    """What rigid levels at one point of the axes are measured against too; None where no case with any is left.
+
+    A method that its scene refuses there has no levels; its runs say why.
+    """
     pending = {case["method"]: case for case in cases if store.find(ERRORS, case) is None}
-    found = (stiff_stops(_bench(study, case)) for case in pending.values())
-    return next((stiff for stiff in found if stiff is not None), None)
+    for case in pending.values():
+        with contextlib.suppress(MultiPhiValueError):
+            stiff = stiff_stops(_bench(study, case))
+            if stiff is not None:
+                return stiff
+    return None
 
 
 def _bench(study: Study, parameters: Mapping[str, Any]) -> Workbench:

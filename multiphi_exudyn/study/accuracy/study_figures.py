@@ -59,7 +59,7 @@ __all__ = [
 ]
 
 MARKERS = ("o", "D", "^", "v", "<", ">", "p", "h")
-FULL_COLOURS, FULL_MARKERS = (BLACK, FULL, "#4D4D4D"), ("s", "P", "X")
+FULL_COLOURS, FULL_MARKERS = (BLACK, FULL, "#4D4D4D"), ("s", "d", "X")
 MOST_ORDERS = 5  # written one by one
 MOST_TICKS = 10
 WIDE = 10.0  # ratio of largest to smallest value from which an axis is logarithmic

@@ -66,7 +66,8 @@ def findings(result: StudyResult) -> dict[str, tuple[str, ...]]:
 def study_warnings(result: StudyResult) -> list[str]:
     """What the models warn of, a sentence for each kind, and how long their runs are determined."""
     rows = [row for row in (*result.rows, *result.budgets) if row.status == "ok"]
-    runs = [(_run_words(row.parameters), _warnings(row)) for row in rows]
+    several = len(points(result)) > 1
+    runs = [(_run_words(row.parameters, several), _warnings(row)) for row in rows]
     own = settings(result)
     horizons = [
         (named(method, setting), measures.get("horizon_s", {}))
@@ -94,10 +95,11 @@ def records(table: pd.DataFrame) -> list[dict[str, Any]]:
     return [{str(name): value for name, value in line.items()} for line in found]
 
 
-def _run_words(parameters: Mapping[str, Any]) -> str:
-    """A run, in words of its own."""
+def _run_words(parameters: Mapping[str, Any], several: bool) -> str:
+    """A run, in words of its own; several: whether it has its point of the scene's axes in them."""
+    at = parameters["at"] if several else {}
     near = "".join(f", {field} × {factor:g}" for field, factor in parameters["nearby"].items())
-    return named(parameters["method"], {**parameters["setting"], **parameters["at"]}) + near
+    return named(parameters["method"], {**parameters["setting"], **at}) + near
 
 
 def _warnings(row: Row) -> list[str]:
