@@ -63,7 +63,7 @@ def full_methods(result: StudyResult) -> list[str]:
 
 def points(result: StudyResult) -> list[Mapping[str, Any]]:
     """The points of the scene's axes, [{}] for a study without."""
-    return list({key_of(row.parameters["at"]): row.parameters["at"] for row in result.rows}.values())
+    return result.runs.drop_duplicates("point")["at"].tolist()
 
 
 def front(table: pd.DataFrame) -> pd.DataFrame:
@@ -160,7 +160,7 @@ def named(method: str, setting: Mapping[str, Any]) -> str:
 
 
 def _at(table: pd.DataFrame, at: Mapping[str, Any]) -> pd.DataFrame:
-    return table[table["at"].map(lambda each: each == at).astype(bool)]
+    return table[table.point == key_of(at)]
 
 
 def _coarser(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:

@@ -22,7 +22,7 @@ from multiphi_exudyn.study.accuracy.analysis import (
     stiff_errors,
     uncertainty,
 )
-from multiphi_exudyn.study.accuracy.study_file import REFERENCE
+from multiphi_exudyn.study.accuracy.study_file import COARSER, REFERENCE
 from multiphi_exudyn.study.accuracy.study_result import StudyResult
 from multiphi_exudyn.study.comparison.pages import sentences
 from multiphi_exudyn.study.comparison.run_warnings import run_warnings
@@ -78,7 +78,7 @@ def study_warnings(result: StudyResult) -> list[str]:
 
 def shown_points(result: StudyResult) -> list[Mapping[str, Any]]:
     """The first points of the scene's axes, those with times before the others."""
-    timed = [at for at in points(result) if settings_at(result, at).online_s.notna().any()]
+    timed = settings(result).dropna(subset="online_s").drop_duplicates("point")["at"].tolist()
     return (timed or points(result))[:MOST_POINTS]
 
 
@@ -141,7 +141,8 @@ def _cheapest(result: StudyResult, at: Mapping[str, Any], tolerance: float) -> d
 
 def _uncertainties(result: StudyResult) -> dict[str, Any]:
     """How far the reference's coarser copy is off at most, and until when [s] the two agree, if not throughout."""
-    at = max(points(result) or [{}], key=lambda each: uncertainty(result, each) or 0.0)
+    coarser = result.table[result.table.method == COARSER].sort_values("own_error", ascending=False, kind="stable")
+    at: Mapping[str, Any] = next(iter(coarser["at"]), {})
     own = uncertainty(result, at)
     until = {tolerance: pointwise_until(result, at, tolerance) for tolerance in result.study.tolerances}
     return {

@@ -66,12 +66,13 @@ class StudyResult:
     def runs(self) -> pd.DataFrame:
         """A line for each run of the error pass.
 
-        key: of its setting. at, setting, nearby: field -> value. error: NaN without. cause: why there is none, or "".
-        measures: all of them, by name.
+        key: of its setting; point: of its point of the scene's axes. at, setting, nearby: field -> value.
+        error: NaN without; cause: why there is none, or "". measures: all of them, by name.
         """
         lines = [
             {
                 "key": _setting_key(row),
+                "point": key_of(row.parameters["at"]),
                 **row.parameters,
                 "error": error_of(self, row),
                 "cause": _cause(self, row),
@@ -79,7 +80,7 @@ class StudyResult:
             }
             for row in self.rows
         ]
-        columns = ["key", "method", "at", "setting", "nearby", "error", "cause", "measures"]
+        columns = ["key", "point", "method", "at", "setting", "nearby", "error", "cause", "measures"]
         return pd.DataFrame(lines, columns=columns).astype({"error": float})
 
     @functools.cached_property
@@ -111,9 +112,8 @@ class StudyResult:
         pairs = list(zip(fields, table.setting, strict=True))
         alike = [key_of({name: value for name, value in given.items() if name != field}) for field, given in pairs]
         order = [given.get(field, 0.0) * (-1 if field in COUNTS else 1) for field, given in pairs]
-        places = table["at"].map(key_of)
         finest_first = table.assign(order=pd.array(order, float)).sort_values("order", kind="stable")
-        return finest_first.error.groupby([places, table.method, pd.Series(alike, table.index)]).cummax()
+        return finest_first.error.groupby([table.point, table.method, pd.Series(alike, table.index)]).cummax()
 
 
 def error_of(result: StudyResult, row: Row) -> float | None:

@@ -25,6 +25,7 @@ __all__ = [
     "COLOURS",
     "FULL",
     "LINE",
+    "NOTE",
     "REFERENCE",
     "STYLE",
     "WIDTH",
