@@ -11,7 +11,7 @@ import pytest
 from hypothesis import settings
 
 from multiphi_exudyn.errors import MultiPhiError
-from multiphi_exudyn.study.comparison import plots
+from multiphi_exudyn.study.comparison import figure_style
 from multiphi_exudyn.study.running import timing
 from reference_models.exudyn_quiet import quiet
 
@@ -35,16 +35,16 @@ def short_timing() -> Iterator[None]:
 @pytest.fixture(scope="session", autouse=True)
 def pictures() -> Iterator[Callable[[], AbstractContextManager[None]]]:
     """Pages hold no pictures, at which nobody looks, but those made ``with pictures():``."""
-    draw = plots.png
+    draw = figure_style.png
 
     @contextmanager
     def drawn() -> Iterator[None]:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(plots, "png", draw)
+            patch.setattr(figure_style, "png", draw)
             yield
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plots, "png", lambda figure: b"")
+        patch.setattr(figure_style, "png", lambda figure: b"")
         yield drawn
 
 

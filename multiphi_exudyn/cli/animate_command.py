@@ -10,7 +10,7 @@ from tqdm import tqdm
 from multiphi_exudyn.cli.options import results_folder
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.files import write_whole
-from multiphi_exudyn.study.comparison.animation import animation, gif, stage_of
+from multiphi_exudyn.study.comparison.animation import gif, stage_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.time.warning_groups import grouped
 
@@ -36,7 +36,7 @@ def run_animate(
         print(f"warning: {group.told(len(runs))}")
     count = len(stage.time)
     with tqdm(total=count, disable=None, unit="frame", delay=BAR_DELAY, leave=False) as bar:
-        write_whole(file, gif(animation(stage, runs), lambda frame, total: bar.update()))
+        write_whole(file, gif(stage, runs, bar.update))
     print(f"{count} frames, {stage.slow:g} times slower than reality\n{file}")
     return True
 

@@ -11,7 +11,7 @@ from multiphi_exudyn.cli.options import results_folder
 from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.accuracy.budget import budget
 from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
-from multiphi_exudyn.study.comparison.plots import png
+from multiphi_exudyn.study.comparison.figure_style import png
 from multiphi_exudyn.study.comparison.wording import percent
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene

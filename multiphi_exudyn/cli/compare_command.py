@@ -14,11 +14,10 @@ from tqdm import tqdm
 from multiphi_exudyn.cli.options import results_folder
 from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.comparison.compare import Comparison, compare, histories, summary
-from multiphi_exudyn.study.comparison.findings import findings
+from multiphi_exudyn.study.comparison.findings import comparison_warnings, findings
 from multiphi_exudyn.study.comparison.losses import loss_tables
 from multiphi_exudyn.study.comparison.mode_shapes import level_modes
 from multiphi_exudyn.study.comparison.report import render
-from multiphi_exudyn.study.comparison.warned import warned
 from multiphi_exudyn.study.comparison.wording import percent, seconds, times
 from multiphi_exudyn.study.running.environment import environment, import_times
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
@@ -70,7 +69,7 @@ def _print_summary(comparison: Comparison, folder: Path) -> None:
             error += f", from stiff stops {percent(comparison.stiff_error(run, until))}"
         line = f"{seconds(run.online_s):>9}  {times(comparison.speedup(run)):>10}  {error if run.ok else run.message}"
         print(f"{name:{width}}  {run.status:6}  {line}")
-    print(f"\n{findings(comparison).outcome}")
-    for sentence in warned(comparison):
+    print("", *findings(comparison)["outcome"], sep="\n")
+    for sentence in comparison_warnings(comparison):
         print(f"warning: {sentence}")
     print(folder / "report.html")

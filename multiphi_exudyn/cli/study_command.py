@@ -7,14 +7,12 @@ from pathlib import Path
 
 from multiphi_exudyn.cli.options import results_folder
 from multiphi_exudyn.files import write_whole
-from multiphi_exudyn.study.accuracy.analysis import cheapest, points, settings, times_faster, words
-from multiphi_exudyn.study.accuracy.analysis import full_methods as full_methods_of
+from multiphi_exudyn.study.accuracy.analysis import cheapest, points, words
 from multiphi_exudyn.study.accuracy.cases import load_study
 from multiphi_exudyn.study.accuracy.study import run_study
+from multiphi_exudyn.study.accuracy.study_findings import records, study_warnings
 from multiphi_exudyn.study.accuracy.study_report import render_study
-from multiphi_exudyn.study.accuracy.study_result import StudyResult
-from multiphi_exudyn.study.accuracy.study_table import csv_text
-from multiphi_exudyn.study.accuracy.study_warnings import warned
+from multiphi_exudyn.study.accuracy.study_result import StudyResult, csv_text
 from multiphi_exudyn.study.comparison.wording import percent, seconds, share, times
 from multiphi_exudyn.study.results import TABLE
 from multiphi_exudyn.study.sweep.executors import open_executor
@@ -45,27 +43,21 @@ def _complete(result: StudyResult) -> bool:
 
 
 def _print_summary(result: StudyResult, folder: Path) -> None:
-    """Print the cheapest setting of every method for every tolerance, at the first point of the axes, if timed."""
-    all_points = points(result) if result.rows else [{}]
-    at = all_points[0]
-    first = f", at the first of {len(all_points)} points: {words(at)}" if at else ""
-    settings_here = [setting for setting in settings(result) if setting.at == at]
-    full = full_methods_of(result)
+    """The cheapest setting of every method for every tolerance, at the first point of the axes, if it was timed."""
+    places = points(result) if result.rows else [{}]
+    at = places[0]
+    first = f", at the first of {len(places)} points: {words(at)}" if at else ""
     for tolerance in result.study.tolerances if result.timings else ():
-        chosen = cheapest(settings_here, tolerance)
-        faster = times_faster(chosen, full)
         print(f"\ncheapest within {share(tolerance)} (NRMSE to {result.window:g} s){first}")
         print(f"  {'method':32}  {'online':>9}  {'faster':>12}  {'error':>8}  setting")
-        for name, setting in chosen.items():
-            if setting is None:
-                print(f"  {name:32}  none")
+        for best in records(cheapest(result, at, tolerance)):
+            if best["online_s"] is None:
+                print(f"  {best['method']:32}  none")
                 continue
-            line = (
-                f"{seconds(setting.online_s or 0.0):>9}  {times(faster[name]):>12}  {percent(setting.error or 0.0):>8}"
-            )
-            print(f"  {name:32}  {line}  {words(setting.setting)}")
+            numbers = f"{seconds(best['online_s']):>9}  {times(best['faster']):>12}  {percent(best['error']):>8}"
+            print(f"  {best['method']:32}  {numbers}  {words(best['setting'])}")
     rows = result.rows + result.budgets
     failed = sum(row.status != "ok" for row in rows)
-    for sentence in warned(result):
+    for sentence in study_warnings(result):
         print(f"warning: {sentence}")
     print(f"\n{len(rows)} runs, {failed} without an answer\n{folder / 'report.html'}")

@@ -8,7 +8,7 @@ from small_study import result_of, row
 
 from multiphi_exudyn import MultiPhiValueError, cli, study
 from multiphi_exudyn.study import load
-from multiphi_exudyn.study.accuracy.study_table import csv_text
+from multiphi_exudyn.study.accuracy.study_result import csv_text
 from multiphi_exudyn.study.scene.places import with_value
 
 

@@ -14,72 +14,81 @@ from multiphi_exudyn.study.accuracy.analysis import (
     cheapest,
     front,
     full_methods,
+    indicators,
     points,
     pointwise_until,
-    references,
+    rank_correlation,
+    references_at,
     settings,
-    times_faster,
     uncertainty,
     words,
 )
-from multiphi_exudyn.study.accuracy.indicator import indicators, rank_correlation
-from multiphi_exudyn.study.accuracy.study_result import Setting
-from multiphi_exudyn.study.accuracy.study_table import csv_text
+from multiphi_exudyn.study.accuracy.study_file import MethodSpec
+from multiphi_exudyn.study.accuracy.study_result import csv_text
 
 STEP = {"step": 1e-4}
+REFINED = MethodSpec(name="m", model={"kind": "reduced"}, refine="modes")
 
 
-def timed(*pairs, method="a"):
-    """Settings 1, 2, ... of one method with given (time, error)."""
-    runs = [(i, online, error) for i, (online, error) in enumerate(pairs)]
-    rows = [row(method, error, setting={"modes": i + 1}) for i, _, error in runs]
-    timings = [timing(method, online, setting={"modes": i + 1}) for i, online, _ in runs if online is not None]
-    return settings(result_of(rows, timings))
+def timed(**pairs):
+    """A study of methods whose settings 1, 2, ... have given (time, error)."""
+    runs = [(name, {"modes": i}, *pair) for name, given in pairs.items() for i, pair in enumerate(given, start=1)]
+    rows = [row(name, error, setting=setting) for name, setting, _, error in runs]
+    timings = [timing(name, online, setting=setting) for name, setting, online, _ in runs if online is not None]
+    methods = [{"name": name, "model": {"kind": "full" if "full" in name else "reduced"}} for name in pairs]
+    return result_of(rows, timings, methods)
 
 
-def modes_of(found):
-    return [setting.setting["modes"] for setting in found]
+def lines(table):
+    return list(table.itertuples())
+
+
+def modes_of(table):
+    return [setting["modes"] for setting in table.setting]
+
+
+def chosen(found):
+    """Method -> number of modes of its setting, None where it has none."""
+    return {s.method: None if pd.isna(s.online_s) else s.setting["modes"] for s in lines(found)}
 
 
 def test_a_setting_is_as_wrong_as_the_worst_of_its_nearby_runs_and_of_the_judged_points():
     rows = [
         row("a", e, setting=STEP, nearby=near) for e, near in ((0.01, {}), (0.05, {"step": 0.9}), (0.02, {"step": 0.8}))
     ]
-    (found,) = settings(result_of(rows, [timing("a", 2.0, setting=STEP)]))
+    (found,) = lines(settings(result_of(rows, [timing("a", 2.0, setting=STEP)])))
     assert (found.error, found.own_error, found.message) == (0.05, 0.01, "")
-    assert (found.online_s, found.spread, found.first_s, found.offline_s) == (2.0, (1.8, 2.6), 4.0, 0.3)
-    (only_node2,) = settings(result_of(rows, judged_points=("node2",)))
+    assert (found.online_s, found.repeats_s, found.first_s, found.offline_s) == (2.0, [2.0, 1.8, 2.6], 4.0, 0.3)
+    (only_node2,) = lines(settings(result_of(rows, judged_points=("node2",))))
     assert only_node2.error == 0.025
 
 
 @pytest.mark.parametrize("status", ["failed", "over budget"])
 def test_one_nearby_run_without_an_error_leaves_a_gap_with_its_cause(status):
     rows = [row("a", 0.01, setting=STEP), row("a", setting=STEP, nearby={"step": 0.9}, status=status, message="why")]
-    (found,) = settings(result_of(rows, [timing("a", 2.0, setting=STEP)]))
-    assert found.error is None
+    result = result_of(rows, [timing("a", 2.0, setting=STEP)])
+    (found,) = lines(settings(result))
+    assert math.isnan(found.error)
     assert found.own_error == 0.01
     assert found.message == f"{status}: why (nearby: step × 0.9)"
-    assert front([found]) == []
-    assert cheapest([found], 1.0) == {"a": None}
+    assert front(settings(result)).empty
+    assert chosen(cheapest(result, {}, 1.0)) == {"a": None}
 
 
 def test_no_error_is_told_apart_from_no_run_and_the_reference_needs_none():
     rows = [row("reference"), row("a"), row("b", 0.1)]
     broken = replace(timing("b", 1.0), status="failed", message="machine asleep", values={})
     result = result_of(rows, [broken])
-    assert [s.message for s in settings(result)] == [
-        "no error: nothing to compare it with",
-        "timing failed: machine asleep",
-    ]
-    assert references(result)[0].message == ""
+    assert list(settings(result).message) == ["no error: nothing to compare it with", "timing failed: machine asleep"]
+    assert list(references_at(result, {}).message) == [""]
     half = result_of([replace(row("a"), values={"nrmse": {"0.3": {"node2": 0.1, "node3": None}}})])
-    assert settings(half)[0].error is None
+    assert list(settings(half).error.isna()) == [True]
 
 
 def test_settings_at_other_points_of_the_scene_are_others():
     rows = [row(m, e, {"load": x}) for x, e in ((1.0, 0.1), (2.0, 0.2)) for m in ("coarser", "a")]
     result = result_of(rows, [timing("a", x, {"load": x}) for x in (1.0, 2.0)])
-    assert [(s.at["load"], s.error, s.online_s) for s in settings(result)] == [(1.0, 0.1, 1.0), (2.0, 0.2, 2.0)]
+    assert [(s.at["load"], s.error, s.online_s) for s in lines(settings(result))] == [(1.0, 0.1, 1.0), (2.0, 0.2, 2.0)]
     assert points(result) == [{"load": 1.0}, {"load": 2.0}]
     assert uncertainty(result, {"load": 2.0}) == 0.2
     assert uncertainty(result, {"load": 3.0}) is None
@@ -98,20 +107,22 @@ def test_settings_at_other_points_of_the_scene_are_others():
     ],
 )
 def test_the_front_holds_what_nothing_beats_in_time_and_error(pairs, expected):
-    assert modes_of(front(timed(*pairs))) == expected
+    assert modes_of(front(timed(a=pairs).table)) == expected
 
 
 def test_the_cheapest_setting_is_the_fastest_that_holds_the_tolerance():
-    both = [*timed((1, 0.5), (2, 0.02), (3, 0.01), (4, 0.001)), *timed((9, 0.3), method="b")]
-    assert cheapest(both, 0.02) == {"a": both[1], "b": None}
-    assert cheapest(both, 0.0199)["a"] is both[2]
-    assert cheapest(both, 1e-6) == {"a": None, "b": None}
+    both = timed(a=[(1, 0.5), (2, 0.02), (3, 0.01), (4, 0.001)], b=[(9, 0.3)])
+    assert chosen(cheapest(both, {}, 0.02)) == {"a": 2, "b": None}
+    assert chosen(cheapest(both, {}, 0.0199)) == {"a": 3, "b": None}
+    assert chosen(cheapest(both, {}, 1e-6)) == {"a": None, "b": None}
 
 
 def test_how_many_times_faster_counts_from_the_fastest_full_model_of_the_same_tolerance():
-    chosen = {"a": timed((2, 0.1))[0], "full": timed((10, 0.1))[0], "other full": timed((8, 0.1))[0], "none": None}
-    assert times_faster(chosen, ["full", "other full"]) == {"a": 4, "full": 0.8, "other full": 1, "none": None}
-    assert set(times_faster(chosen, ["none"]).values()) == {None}
+    given = {"full": [(10, 0.1)], "a": [(2, 0.1)], "other full": [(8, 0.1), (5, 0.3)], "none": [(1, 0.9)]}
+    found = cheapest(timed(**given), {}, 0.1)
+    assert list(found.method) == ["a", "other full", "full", "none"]  # the fastest first
+    assert list(found.faster) == pytest.approx([4, 1, 0.8, math.nan], nan_ok=True)
+    assert cheapest(timed(a=[(2, 0.1)], full=[(1, 0.9)]), {}, 0.1).faster.isna().all()
     assert full_methods(small_study()) == ["full ANCF"]
 
 
@@ -123,13 +134,13 @@ def test_observed_orders_are_those_of_the_power_law(axis, values, order):
     sign = 1 if axis == "step" else -1
     rows = [row("a", 1e-3 * (v / values[0]) ** (sign * order), setting={axis: v}) for v in reversed(values)]
     found = series(settings(result_of(rows)), "a", axis)
-    assert found.values == values
-    assert found.orders == pytest.approx((order,) * (len(values) - 1))
+    assert list(found.table.value) == list(values)
+    assert list(found.table.order[1:]) == pytest.approx([order] * (len(values) - 1))
 
 
 def test_a_gap_or_a_zero_has_no_order():
     rows = [row("a", 0.1, setting={"modes": 1}), row("a", 0.0, setting={"modes": 2}), row("a", setting={"modes": 3})]
-    assert series(settings(result_of(rows)), "a", "modes").orders == (None, None)
+    assert series(settings(result_of(rows)), "a", "modes").table.order.isna().all()
 
 
 def test_the_other_fields_stand_at_their_finest_that_has_errors():
@@ -137,7 +148,7 @@ def test_the_other_fields_stand_at_their_finest_that_has_errors():
     assert series(found, "full ANCF", "step").fixed == {"elements": 16}
     assert series(found, "full ANCF", "elements").fixed == {"step": 2e-5}
     assert series(found, "Craig-Bampton", "step").fixed == {"modes": 8}
-    gone = [replace(s, error=None) if s.setting.get("elements") == 16 else s for s in found]
+    gone = found.assign(error=found.error.where(found.setting.map(lambda each: each.get("elements") != 16)))
     assert series(gone, "full ANCF", "step").fixed == {"elements": 8}
     assert series(found, "Multi-Phi", "step") is None
     rows = [row("a", r, setting={"modes": m, "step": s}) for m, r in ((2, 1), ("all", 2)) for s in (1, 2)]
@@ -146,20 +157,20 @@ def test_the_other_fields_stand_at_their_finest_that_has_errors():
 
 def test_along_the_scene_methods_and_the_reference_stand_side_by_side():
     result = small_study({"start.displacement": [-0.01, 0.02]})
-    assert numeric_axes(settings(result), of_scene=True) == ["start.displacement"]
-    assert numeric_axes(settings(result), of_scene=False) == ["modes", "step", "elements"]
-    tables = {(table.quantity, table.contact): table for table in tables_along(result, "start.displacement")}
-    assert set(tables) == {("error", ""), ("first_contact", "stop"), ("inner_losses", "stop"), ("impulse", "stop")}
-    error = tables["error", ""]
-    assert list(error.frame.columns) == [-0.01, 0.02]
-    assert "reference" not in error.frame.index
-    assert list(error.frame.loc["coarser"]) == [0.001, 0.001]
-    assert list(error.frame.loc["Multi-Phi"]) == pytest.approx([1.4 * 1.2 * 16**-2.5, 1.8 * 1.2 * 16**-2.5])
-    losses = tables["inner_losses", "stop"].frame
+    assert numeric_axes(settings(result), "at") == ["start.displacement"]
+    assert numeric_axes(settings(result), "setting") == ["modes", "step", "elements"]
+    tables = tables_along(result, "start.displacement")
+    assert list(tables) == ["error", "first_contact.stop", "inner_losses.stop", "impulse.stop"]
+    error = tables["error"]
+    assert list(error.columns) == [-0.01, 0.02]
+    assert "reference" not in error.index
+    assert list(error.loc["coarser"]) == [0.001, 0.001]
+    assert list(error.loc["Multi-Phi"]) == pytest.approx([1.4 * 1.2 * 16**-2.5, 1.8 * 1.2 * 16**-2.5])
+    losses = tables["inner_losses.stop"]
     assert list(losses.loc["reference"]) == [0, 0]
     assert list(losses.loc["Multi-Phi, rigid"]) == [round(40 * (0.06 + 12**-2) * grown) for grown in (1.4, 1.8)]
-    slope = series(settings(result), "Multi-Phi", "start.displacement").orders
-    assert slope == (None,)  # a value that changes its sign
+    slope = series(settings(result), "Multi-Phi", "start.displacement").table.order
+    assert list(slope.isna()) == [True, True]  # a value that changes its sign
 
 
 def test_a_value_that_a_method_lacks_is_an_empty_cell():
@@ -169,9 +180,9 @@ def test_a_value_that_a_method_lacks_is_an_empty_cell():
         row("b", 0.3, {"load": 2.0}),
         row("b", 0.4, {"load": 3.0}),
     ]
-    (error,) = tables_along(result_of(rows), "load")
-    assert error.frame.loc["a"].tolist() == pytest.approx([0.1, 0.2, math.nan], nan_ok=True)
-    assert error.frame.loc["b"].tolist() == pytest.approx([math.nan, 0.3, 0.4], nan_ok=True)
+    error = tables_along(result_of(rows), "load")["error"]
+    assert error.loc["a"].tolist() == pytest.approx([0.1, 0.2, math.nan], nan_ok=True)
+    assert error.loc["b"].tolist() == pytest.approx([math.nan, 0.3, 0.4], nan_ok=True)
 
 
 def paired(indicator, error):
@@ -241,19 +252,20 @@ def test_a_setting_lasts_where_every_finer_one_holds_too():
     rows = [row("full", error, setting={"elements": n, "step": h}) for (n, h), error in errors.items()]
     method = {"name": "full", "model": {"kind": "full"}}
     found = settings(result_of(rows, methods=[method | {"refine": "step"}]))
-    assert [s.lasting_error for s in found] == [0.05, 0.02, 0.02, 0.02, None, None]
-    assert all(s.lasting_error == s.error for s in settings(result_of(rows, methods=[method])))
+    assert list(found.lasting_error) == pytest.approx([0.05, 0.02, 0.02, 0.02, math.nan, math.nan], nan_ok=True)
+    plain = settings(result_of(rows, methods=[method]))
+    assert plain.lasting_error.equals(plain.error)
 
 
 def test_few_modes_that_are_right_by_chance_do_not_last():
     """Error 0.9 % with 4 modes, 6 % with 6 and 0.4 % with 8."""
     rows = [row("few", error, setting={"modes": r}) for r, error in ((4, 0.009), (6, 0.06), (8, 0.004))]
     method = {"name": "few", "model": {"kind": "reduced"}, "refine": "modes"}
-    assert [s.lasting_error for s in settings(result_of(rows, methods=[method]))] == [0.06, 0.06, 0.004]
+    assert list(settings(result_of(rows, methods=[method])).lasting_error) == [0.06, 0.06, 0.004]
 
 
 def test_the_cheapest_lasting_setting_is_another_one():
-    lucky = Setting("m", {}, {"step": 2}, 0.01, 0.01, "", {}, {"online_s": 1.0}, lasting_error=0.05)
-    sound = Setting("m", {}, {"step": 1}, 0.01, 0.01, "", {}, {"online_s": 2.0}, lasting_error=0.01)
-    assert cheapest([lucky, sound], 0.02) == {"m": lucky}
-    assert cheapest([lucky, sound], 0.02, lasting=True) == {"m": sound}
+    given = timed(m=[(1, 0.01), (2, 0.05), (3, 0.015)])  # right by chance with one mode
+    given = replace(given, study=given.study.model_copy(update={"methods": [REFINED]}))
+    assert chosen(cheapest(given, {}, 0.02)) == {"m": 1}
+    assert chosen(cheapest(given, {}, 0.02, lasting=True)) == {"m": 3}

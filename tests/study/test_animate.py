@@ -16,8 +16,8 @@ from multiphi_exudyn.study.comparison.animation import (
     PERIOD_SHOWN,
     Stage,
     _closed,
-    animation,
     gif,
+    moving_figure,
     stage_of,
 )
 from multiphi_exudyn.study.running.runners import run_model
@@ -60,10 +60,9 @@ def drawn(path, frame, **chosen):
     """The stage, both runs, and the axes of one frame."""
     stage = stage_of(load_scene(path), **chosen)
     runs = stage.runs(progress=False)
-    moving = animation(stage, runs)
-    moving._func(frame)
-    moving._draw_was_started = True  # it is looked at here, not saved
-    return stage, runs, moving._fig.axes
+    figure, move = moving_figure(stage, runs)
+    move(frame)
+    return stage, runs, figure.axes
 
 
 def test_points_at_every_node_leave_both_models_as_they_are(scene):
@@ -94,13 +93,12 @@ def test_the_shape_between_the_points_is_the_trajectory_of_the_linear_elements(t
 def test_a_stop_stands_where_the_gap_is_closed_and_has_the_colour_of_closed_only_then(scene):
     stage, runs, _ = drawn(scene, 0, slow=20.0)
     run = runs["full"]
-    moving = animation(stage, runs)
-    moving._draw_was_started = True
+    figure, move = moving_figure(stage, runs)
     closed = _closed(run.contact_intervals["stop"], stage.time)
     assert 0 < np.sum(closed) < len(closed)
     for frame in (0, int(np.argmax(closed))):
-        moving._func(frame)
-        mark = moving._fig.axes[0].lines[1]
+        move(frame)
+        mark = figure.axes[0].lines[1]
         assert (mark.get_xdata()[0], mark.get_marker()) == (0.3, "^")
         assert mark.get_ydata()[0] == pytest.approx(-1.0, abs=1e-6)
         assert (mark.get_color() == CLOSED) == closed[frame]
@@ -131,10 +129,10 @@ def test_beams_that_meet_are_each_shown_with_the_other_where_it_would_touch(tmp_
 
 def test_the_gif_has_every_frame_and_its_rate(scene):
     stage = stage_of(load_scene(scene), slow=4.0)
-    told = []
-    content = gif(animation(stage, stage.runs(progress=False)), lambda frame, total: told.append((frame, total)))
+    drawn_frames = []
+    content = gif(stage, stage.runs(progress=False), lambda: drawn_frames.append(1))
     with Image.open(io.BytesIO(content)) as written:
-        assert written.n_frames == len(stage.time) == len(told) == 10
+        assert written.n_frames == len(stage.time) == len(drawn_frames) == 10
         assert written.info["duration"] == 40
         assert written.info["loop"] == 0
 

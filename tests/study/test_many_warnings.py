@@ -17,12 +17,13 @@ import multiphi_exudyn as mp
 from multiphi_exudyn import cli
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 from multiphi_exudyn.study.accuracy import study_report
+from multiphi_exudyn.study.accuracy.study_findings import study_warnings
 from multiphi_exudyn.study.accuracy.study_report import render_study
-from multiphi_exudyn.study.accuracy.study_warnings import warned as warned_of_study
 from multiphi_exudyn.study.comparison import report
 from multiphi_exudyn.study.comparison.compare import compare, summary
+from multiphi_exudyn.study.comparison.findings import comparison_warnings
+from multiphi_exudyn.study.comparison.pages import Picture
 from multiphi_exudyn.study.comparison.report import render
-from multiphi_exudyn.study.comparison.warned import warned
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import from_arrays, to_arrays
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
@@ -49,9 +50,8 @@ def warning_runs(monkeypatch):
 def no_pictures(monkeypatch):
     """Pages without them, which take most of their time."""
     monkeypatch.setattr(report, "_pictures", lambda comparison, levels: ())
-    monkeypatch.setattr(study_report, "_convergence", lambda result, at: None)
-    monkeypatch.setattr(study_report, "_along", lambda result, axis: study_report.Picture("", ""))
-    monkeypatch.setattr(study_report, "_indicator", lambda result: None)
+    monkeypatch.setattr(study_report, "_drawn", lambda figure, caption: None)
+    monkeypatch.setattr(study_report, "_along", lambda result, axis: (axis, Picture("", ""), []))
 
 
 @pytest.fixture
@@ -99,15 +99,16 @@ def test_a_comparison_shows_what_its_models_warn_of_first(warning_runs, scene_fi
     assert {name: (each["warnings"], each["horizon_s"]) for name, each in models.items()} == dict.fromkeys(
         ("all", "r6"), ([LINEAR, SHARE], {"0.01": 0.05})
     )
-    told = warned(comparison)
-    assert told[0] == "linear range, all and r6: " + LINEAR.partition(": ")[2]
-    assert told[1].startswith("static share, all and r6: ")
+    told = comparison_warnings(comparison)
+    assert told[0] == "linear range: 2 of 2 runs (all, r6); the first: " + LINEAR.partition(": ")[2]
+    assert told[1].startswith("static share: 2 of 2 runs (all, r6); ")
     assert told[2].startswith(
-        "sensitivity: with a start changed by 1e-12 a run stays within 1 % of this one until: all"
+        "sensitivity: 2 of 2 runs are not determined to their end: with a start changed by 1e-12 they differ by 1 %, "
+        "all from 0.05 s on"
     )
     assert len(told) == 3
-    page = text_of(render(comparison, (), ()))
-    assert page.index("Linear range, all and r6: moments") < page.index("Key figures")
+    page = text_of(render(comparison, (), {}))
+    assert page.index("Linear range: 2 of 2 runs (all, r6); the first: moments") < page.index("Key figures")
     assert "sensitivity horizon" in page
 
 
@@ -115,8 +116,8 @@ def test_a_model_that_warns_of_nothing_is_shown_without_a_word(scene_file, monke
     monkeypatch.setattr(sys.modules["multiphi_exudyn.time.simulate"], "warnings_of", lambda *given: ())
     monkeypatch.setattr(Trajectory, "horizon", lambda self, tolerance: self.t_end)
     comparison = compare(bench_of(scene_file), ENVIRONMENT, progress=False)
-    assert warned(comparison) == []
-    assert "whole run" in text_of(render(comparison, (), ()))
+    assert comparison_warnings(comparison) == []
+    assert "whole run" in text_of(render(comparison, (), {}))
 
 
 def test_a_comparison_prints_a_line_for_each_and_issues_none(warning_runs, scene_file, tmp_path, capsys):
@@ -133,8 +134,8 @@ def test_a_study_keeps_the_warnings_of_every_run(warning_runs, tmp_path, capsys)
     file = write(tmp_path / "study.toml", study | {"methods": [method], "timing": False})
     assert cli.main(["study", file, "--on", "serial", "--out", str(tmp_path / "out")]) == 0
     told = [line for line in capsys.readouterr().out.splitlines() if line.startswith("warning: ")]
-    assert told[0].startswith("warning: linear range: 6 of 6 runs (reference; levels, r = 2 and r = 4); ")
-    assert told[2].startswith("warning: sensitivity: 2 of 2 settings are not determined")  # at the first point alone
+    assert told[0].startswith("warning: linear range: 6 of 6 runs (reference (start.displacement = 0.01) and 5 more); ")
+    assert told[2].startswith("warning: sensitivity: 2 of 2 runs are not determined")  # at the first point alone
     heads, *lines = (tmp_path / "out" / "runs.csv").read_text().splitlines()
     assert {"warnings", "horizon_s.0.01"} <= set(heads.split(","))
     assert all(json.dumps(LINEAR).replace('"', '""') in line for line in lines)
@@ -145,8 +146,11 @@ def test_a_studys_page_names_the_rows_of_each_kind():
     rows = [row("reference")]
     rows += [row("Multi-Phi", 0.1, setting={"modes": r}, warnings=[SHARE] if r < 6 else []) for r in (3, 4, 6)]
     result = result_of(rows, methods=METHODS)
-    (told,) = warned_of_study(result)
-    assert told == f"static share: 2 of 4 runs (Multi-Phi, r = 3 and r = 4); the first: {SHARE.partition(': ')[2]}"
+    (told,) = study_warnings(result)
+    assert (
+        told
+        == f"static share: 2 of 4 runs (Multi-Phi (r = 3), Multi-Phi (r = 4)); the first: {SHARE.partition(': ')[2]}"
+    )
     assert "Static share: 2 of 4 runs" in text_of(render_study(result))
 
 

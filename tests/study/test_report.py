@@ -11,14 +11,13 @@ import pytest
 from small_scene import BEAM, changed, write
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.study.comparison import plots
+from multiphi_exudyn.study.comparison import figure_style, plots
 from multiphi_exudyn.study.comparison.compare import Comparison, compare, histories, summary
-from multiphi_exudyn.study.comparison.contact_totals import contact_totals
 from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.losses import loss_tables
 from multiphi_exudyn.study.comparison.mode_shapes import level_modes
 from multiphi_exudyn.study.comparison.pages import embedded
-from multiphi_exudyn.study.comparison.report import render
+from multiphi_exudyn.study.comparison.report import contact_totals, render
 from multiphi_exudyn.study.comparison.wording import engineering, percent, seconds, times
 from multiphi_exudyn.study.measures.stiff_stops import StiffStops
 from multiphi_exudyn.study.running.runs import ModelRun
@@ -93,14 +92,14 @@ def text_of(page):
 
 def test_the_first_lines_give_the_errors_times_and_doubts(comparison):
     found = findings(comparison)
-    assert "until tip stands at +10 mm" in found.compared
-    assert "stop (gap 1 mm, 100 kN/m)" in found.compared
-    assert "by 2.00 % to 0.1 s (NRMSE, worst of middle and tip)" in found.outcome
+    compared, outcome, doubts = (" ".join(found[part]) for part in ("compared", "outcome", "distrust"))
+    assert "until tip stands at +10 mm" in compared
+    assert "stop (gap 1 mm, 100 kN/m)" in compared
+    assert "by 2.00 % to 0.1 s (NRMSE, worst of middle and tip)" in outcome
     assert (
         "takes 10 ms: 100 times faster than the cheapest fair full model, 1000 times faster than the reference"
-        in found.outcome
+        in outcome
     )
-    doubts = " ".join(found.distrust)
     assert "coarser copy of itself by 1.00 % to 0.1 s" in doubts
     assert "Rigid levels are the limit of stiff stops" in doubts
 
@@ -113,7 +112,7 @@ def test_rigid_levels_are_measured_against_stiff_stops_in_a_table(page):
 
 
 def test_the_key_figures_are_the_uncertainty_and_the_speed_ups(comparison):
-    figures = {what: value for what, value, _ in findings(comparison).key_figures}
+    figures = dict(row.split(" | ")[:2] for row in findings(comparison)["key_figures"])
     assert figures == {
         "the reference's own uncertainty": "1.00 %",
         "the full model at its cheapest fair setting": "4.00 %",
@@ -133,7 +132,7 @@ def test_the_page_holds_its_pictures_and_points_nowhere_else(page):
 
 
 def test_the_page_has_the_samples_of_its_histories_and_names_cannot_end_their_element(comparison):
-    page = render(comparison, (), ())
+    page = render(comparison, (), {})
     text = re.search(r'<script type="application/json" id="zoom-data">(.*?)</script>', page, re.DOTALL)[1]
     data = json.loads(text)
     assert [plot["label"] for plot in data] == ["middle [mm]", "tip [mm]", "force of stop [N]"]
@@ -150,7 +149,7 @@ def test_the_headline_is_the_fastest_model_that_is_accurate(comparison):
     exact = replace(comparison.runs["compliant-r6"], name="rigid-r6", label="slower and exact", repeats_s=(0.1,))
     points = {name: 1.001 * values for name, values in comparison.reference.points.items()}
     told = replace(comparison, runs=dict(comparison.runs) | {"rigid-r6": replace(exact, points=points)})
-    outcome = findings(told).outcome
+    outcome = " ".join(findings(told)["outcome"])
     assert outcome.startswith("slower and exact differs from the reference by 0.1 %")
     assert outcome.index("slower and exact") < outcome.index("model compliant-r6")
 
@@ -188,16 +187,16 @@ def test_the_histories_are_arrays_on_one_grid(comparison):
 
 def test_without_rigid_levels_no_stiff_stop_is_told_of(comparison):
     plain = replace(comparison, stiff=None)
-    assert "stiff" not in " ".join(findings(plain).distrust)
-    assert "Rigid levels" not in text_of(render(plain, (), ()))
+    assert "stiff" not in " ".join(findings(plain)["distrust"])
+    assert "Rigid levels" not in text_of(render(plain, (), {}))
     assert summary(plain)["stiff_stops"] == {}
 
 
 def test_a_stiff_stop_that_failed_is_told_with_its_cause(comparison):
     spoiled = replace(comparison, stiff=StiffStops((1e8, 1e9, 1e10), (), "chatter at 0.1 s"))
-    assert "nothing with stiff stops ran: chatter at 0.1 s" in " ".join(findings(spoiled).distrust)
+    assert "nothing with stiff stops ran: chatter at 0.1 s" in " ".join(findings(spoiled)["distrust"])
     assert summary(spoiled)["stiff_stops"]["errors"] == {}
-    assert "Rigid levels against stiff stops" not in text_of(render(spoiled, (), ()))
+    assert "Rigid levels against stiff stops" not in text_of(render(spoiled, (), {}))
 
 
 def test_windows_end_with_the_run_and_the_headline_takes_the_longest_that_fits(comparison):
@@ -212,8 +211,8 @@ def test_windows_end_with_the_run_and_the_headline_takes_the_longest_that_fits(c
 def test_a_failed_model_is_a_row_with_its_cause(comparison):
     failed = ModelRun("rigid-r6", "reduced", "rigid", status="failed", message="chatter <at> 0.1 s")
     spoiled = replace(comparison, runs=dict(comparison.runs) | {"rigid-r6": failed})
-    assert "Failed: rigid-r6 (chatter <at> 0.1 s)" in findings(spoiled).outcome
-    assert "failed: chatter &lt;at&gt; 0.1 s" in render(spoiled, (), ())
+    assert "Failed: rigid-r6 (chatter <at> 0.1 s)" in " ".join(findings(spoiled)["outcome"])
+    assert "failed: chatter &lt;at&gt; 0.1 s" in render(spoiled, (), {})
     content = summary(spoiled)
     assert content["models"]["rigid-r6"]["speedup"] is None
     assert "rigid-r6" not in content["errors"]
@@ -222,7 +221,7 @@ def test_a_failed_model_is_a_row_with_its_cause(comparison):
 def test_without_its_reference_the_report_says_so_and_measures_nothing(comparison):
     failed = ModelRun("full", "full", "full beam", status="failed", message="no convergence at 0.02 s")
     spoiled = replace(comparison, runs=dict(comparison.runs) | {"full": failed})
-    text = text_of(render(spoiled, level_modes(spoiled), ()))
+    text = text_of(render(spoiled, level_modes(spoiled), {}))
     assert "The reference failed, so nothing can be measured: no convergence at 0.02 s" in text
     content = summary(spoiled)
     assert content["errors"] == {} == content["reference_uncertainty"] == content["agreement_horizon_s"]
@@ -231,10 +230,10 @@ def test_without_its_reference_the_report_says_so_and_measures_nothing(compariso
 def test_without_a_coarser_copy_the_uncertainty_is_called_unknown(comparison, pictures):
     failed = ModelRun("full-coarser", "full", "full beam", status="failed", message="stopped")
     spoiled = replace(comparison, runs=dict(comparison.runs) | {"full-coarser": failed})
-    assert "uncertainty is unknown" in " ".join(findings(spoiled).distrust)
+    assert "uncertainty is unknown" in " ".join(findings(spoiled)["distrust"])
     assert summary(spoiled)["reference_uncertainty"] == {}
     with pictures():
-        assert plots.png(plots.error_time_figure(spoiled)).startswith(b"\x89PNG")
+        assert figure_style.png(plots.error_time_figure(spoiled)).startswith(b"\x89PNG")
 
 
 def test_pictures_leave_no_global_state(comparison):
@@ -301,7 +300,7 @@ def test_modes_of_several_beams_are_of_the_levels_the_reference_held_longest(tmp
     touching = next(level for level in levels if level.closed == ("ab",))
     first, second, _ = (beam.shapes[0][-1] for beam in touching.beams)
     assert first == pytest.approx(second, rel=0.05)
-    page = render(compared, levels, ())
+    page = render(compared, levels, {})
     assert page.count("data:image/png") == 1 + 1 + 2 + 1 + 1
     assert "the contact ab between a.tip and b.tip (gap 1 mm, 10 kN/m)" in text_of(page)
 
@@ -317,10 +316,10 @@ def test_many_contacts_are_told_of_together(tmp_path):
     page = render(compared, level_modes(compared), loss_tables(compared.bench))
     assert page.count("data:image/png") == 1 + 1 + 1 + 1 + 1
     assert "meets 6 contacts from s1 to s6 (gap 1 mm, 10 kN/m each)" in text_of(page)
-    totals = contact_totals(compared.reference, 0.1)
-    assert 1 < totals.most_at_once <= totals.touched <= 6
-    assert totals.intervals == sum(len(given) for given in compared.reference.contact_intervals.values())
-    assert totals.impulse == pytest.approx(sum(compared.reference.impulse.values()))
+    totals = contact_totals(compared).loc[compared.reference.name]
+    assert 1 < totals["most at once"] <= totals["contacts touched"] <= 6
+    assert totals["contacts made"] == sum(len(given) for given in compared.reference.contact_intervals.values())
+    assert totals["impulse of all"] == f"{sum(compared.reference.impulse.values()):.4g} N s"
     assert "Of 6 contacts." in text_of(page)
 
 

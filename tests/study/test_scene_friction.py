@@ -63,7 +63,7 @@ def test_full_beam_reduced_model_and_body_answer_alike(compared):
 
 
 def test_the_page_and_the_files_tell_of_it(compared):
-    page, content, arrays = render(compared, [], []), summary(compared), histories(compared)
+    page, content, arrays = render(compared, [], {}), summary(compared), histories(compared)
     assert "<th>friction ring</th>" in page
     assert "how far the patch has slipped" in page
     assert content["scene"]["friction"] == [RING | {"velocity": 0.0}]
@@ -75,12 +75,12 @@ def test_the_page_and_the_files_tell_of_it(compared):
 
 def test_grey_is_where_it_sticks_if_there_are_no_contacts(compared):
     figure = history_figure(compared, "tip")
-    assert figure.axes[0].get_title() == "Displacement of tip; grey: friction sticks in the reference"
+    assert figure.axes[0].get_title("left") == "Displacement of tip; grey: friction sticks in the reference"
     assert len(figure.axes) == 2
     spans, _ = greyed(compared.reference)
     assert len(spans) == len(figure.axes[0].patches) > 1
     assert spans == pytest.approx(compared.reference.stick_intervals["ring"])
-    assert "the first contact phase, and" not in render(compared, [], [])
+    assert "the first contact phase, and" not in render(compared, [], {})
 
 
 def test_the_user_object_of_a_stop_that_rubs_is_its_reduced_model():

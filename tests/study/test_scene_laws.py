@@ -186,18 +186,18 @@ class TestReport:
         short = CUBIC | {"span": [-0.005, 0.005]}
         comparison = compared(tmp_path, with_laws(short, models=[MODELS[0], MODELS[0] | {"name": "r6", "modes": 6}]))
         told = findings(comparison)
-        assert "; on it acts the force law spring at tip (50 N/m q +2e+06 N/m³ q³)" in told.compared
-        followed, left = (line for line in told.distrust if "force law spring" in line)
+        assert "On it acts the force law spring at tip (50 N/m q +2e+06 N/m³ q³)" in told["compared"][0]
+        (followed,) = (line for line in told["distrust"] if "force law spring" in line)
         law = comparison.bench.mechanics.force_laws[0]
         assert f"by {len(law.slopes)} straight segments from -5 to 5 mm, to {percent(law.error)} of" in followed
-        assert "leaves the span of the force law spring (-5 to 5 mm): it reaches" in left
+        assert "leaves the span of the force law spring (-5 to 5 mm): it reaches" in followed
         assert comparison.runs["r6"].label == "Multi-Phi, levels of force laws, r = 6"
         page = render(comparison, level_modes(comparison), loss_tables(comparison.bench))
         assert "Without the force laws" in page
         assert summary(comparison)["scene"]["force_laws"][0]["k3"] == 2e6
 
     def test_a_span_that_is_not_left_is_not_told(self, tmp_path):
-        told = findings(compared(tmp_path, with_laws(CUBIC))).distrust
+        told = findings(compared(tmp_path, with_laws(CUBIC)))["distrust"]
         assert not any("leaves the span" in line for line in told)
 
     def test_viscous_contacts_are_drawn_as_rigid_ones_where_levels_are_rigid(self, tmp_path):
@@ -205,7 +205,7 @@ class TestReport:
         comparison = compared(tmp_path, viscous(models=[MODELS[0], rigid]))
         assert comparison.runs["rigid"].message == ""
         assert [level.name for level in level_modes(comparison)] == ["open", "stop closed"]
-        assert "100 kN/m, 300 N s/m" in findings(comparison).compared
+        assert "100 kN/m, 300 N s/m" in findings(comparison)["compared"][0]
         assert summary(comparison)["scene"]["contacts"]["stop"]["damping"] == 300.0
 
     def test_laws_on_the_rig_are_assumptions(self, tmp_path):

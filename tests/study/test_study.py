@@ -7,10 +7,10 @@ import pytest
 from small_scene import BEAM, changed, write
 
 from multiphi_exudyn import MultiPhiValueError
-from multiphi_exudyn.study.accuracy.analysis import points, settings, uncertainty
+from multiphi_exudyn.study.accuracy.analysis import points, settings, settings_at, stiff_errors, uncertainty
 from multiphi_exudyn.study.accuracy.cases import CASE, load_study, shipped_studies
-from multiphi_exudyn.study.accuracy.stiff_errors import stiff_errors
 from multiphi_exudyn.study.accuracy.study import run_study
+from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.workbench import prepare
 from multiphi_exudyn.study.sweep.executors import open_executor
@@ -49,6 +49,12 @@ SCENE = BEAM | {
     "models": [{"kind": "reduced", "name": "all", "modes": "all"}, {"kind": "reduced", "name": "r12", "modes": 12}],
     "comparison": {"reference": "all", "coarser": "r12"},
 }
+
+
+def at_rest(bench, name, progress, horizon=False):
+    """A run in which nothing moves."""
+    points = {point: np.zeros(len(bench.time)) for point in bench.points}
+    return ModelRun(name, bench.scene.models[name].kind, name, time=bench.time, points=points)
 
 
 @pytest.fixture
@@ -198,15 +204,16 @@ class TestRunning:
         found = settings(result)
         assert len(found) == 2 * 4
         for at in points(result):
-            levels = [s for s in found if s.method == "levels" and s.at == at]
-            assert levels[0].error > levels[1].error > levels[2].error > 0
-            assert uncertainty(result, at) < levels[2].error
-            assert all(s.online_s > 0 and len(s.timing["repeats_s"]) >= 3 for s in levels)
-        assert all(s.indicator > 0 for s in found if s.method == "levels")
+            levels = settings_at(result, at).query("method == 'levels'")
+            coarse, middle, fine = levels.error
+            assert coarse > middle > fine > uncertainty(result, at) > 0
+            assert (levels.online_s > 0).all()
+            assert (levels.repeats_s.map(len) >= 3).all()
+        assert all(s.measures["indicator"] > 0 for s in found.itertuples() if s.method == "levels")
         stepwise = [row for row in result.rows if row.parameters["method"] == "stepwise"]
         assert all(row.parameters["nearby"] == {} for row in result.timings)
         assert max(r.values["nrmse"]["0.08"]["tip"] for r in stepwise[:2]) == next(
-            s.error for s in found if s.method == "stepwise"
+            s.error for s in found.itertuples() if s.method == "stepwise"
         )
 
     def test_what_has_run_is_not_run_again(self, finished, monkeypatch):
@@ -238,9 +245,20 @@ class TestRunning:
         data = changed(["methods", 1, "axes"], {"step": [1e-4]}, data)
         data = changed(["methods", 1, "nearby"], {"step": [0.9]}, data) | {"axes": {}}
         result = run_study(load_study(study_file(data)), store, progress=False)
-        failed = [s for s in settings(result) if s.method == "stepwise"]
-        assert all(s.error is None and s.message.startswith("failed: ") for s in failed)
-        assert all(s.error is not None for s in settings(result) if s.method == "levels")
+        failed = settings(result).query("method == 'stepwise'")
+        assert failed.error.isna().all()
+        assert failed.message.str.startswith("failed: ").all()
+        assert settings(result).query("method == 'levels'").error.notna().all()
+
+    def test_a_setting_that_is_none_at_a_later_point_is_a_gap_with_its_cause(self, store, monkeypatch):
+        """Levels with printed frequencies are rigid: at that parameter set the compliant ones are refused."""
+        monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.run_model", at_rest)
+        monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.stiff_stops", lambda bench: None)
+        study = load_study("sets", quick=True)
+        result = run_study(study, store, progress=False)
+        refused = {row.parameters["method"] for row in result.rows if "printed frequencies" in row.message}
+        assert refused == {"Multi-Phi, compliant levels"}
+        assert settings_at(result, study.points[-1]).message.str.startswith("failed: ").any()
 
     def test_rigid_levels_are_measured_against_a_stiff_stop_too_and_nothing_else_is(
         self, study_file, store, monkeypatch
@@ -250,10 +268,9 @@ class TestRunning:
         result = run_study(study, store, progress=False)
         found = {row.parameters["method"]: row.values.get("stiff_stops") for row in result.rows}
         assert found["reference"] is found["coarser"] is found["levels"] is None
-        assert [each.setting.setting["modes"] for each in stiff_errors(result, {})] == [4, 8]
-        assert all(
-            each.uncertainty == found["rigid"]["uncertainty"]["0.08"]["tip"] for each in stiff_errors(result, {})
-        )
+        against = stiff_errors(result, {})
+        assert [setting["modes"] for setting in against.setting] == [4, 8]
+        assert (against.stiff_uncertainty == found["rigid"]["uncertainty"]["0.08"]["tip"]).all()
         monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.stiff_stops", lambda bench: pytest.fail("run again"))
         assert run_study(study, store, progress=False).rows == result.rows
 

@@ -1,16 +1,18 @@
 """What a study's result says: fronts, the cheapest setting, how much faster it is, the reference's own uncertainty.
 
-Nothing is run and nothing drawn here. Times in s.
+Nothing is run and nothing drawn here. Times in s. Tables have the columns of ``StudyResult.table``.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
+import pandas as pd
+
 from multiphi_exudyn.study.accuracy.study_file import COARSER, REFERENCE, is_number
-from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
+from multiphi_exudyn.study.accuracy.study_result import StudyResult, worst_judged
 from multiphi_exudyn.study.comparison.wording import seconds
 from multiphi_exudyn.study.running.runner import modes_words
 from multiphi_exudyn.study.sweep.row import key_of
@@ -19,33 +21,39 @@ __all__ = [
     "cheapest",
     "front",
     "full_methods",
+    "indicators",
     "longest",
+    "most_accurate",
     "named",
-    "names_of",
+    "over_all_points",
     "points",
     "pointwise_until",
-    "references",
+    "rank_correlation",
+    "references_at",
     "settings",
     "settings_at",
-    "times_faster",
+    "stiff_errors",
     "uncertainty",
     "words",
 ]
 
+ROUND_OFF = 1e-9  # NRMSE below which two answers differ by round-off only
+FEWEST = 3  # pairs that have a rank correlation
 
-def settings(result: StudyResult) -> list[Setting]:
+
+def settings(result: StudyResult) -> pd.DataFrame:
     """All settings of the methods under study, in the order of their rows."""
-    return [setting for setting in result.judged if setting.method not in (REFERENCE, COARSER)]
+    return result.table[~result.table.method.isin([REFERENCE, COARSER])]
 
 
-def settings_at(result: StudyResult, at: Mapping[str, Any]) -> list[Setting]:
+def settings_at(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
     """The methods' settings at one point of the scene's axes."""
-    return [setting for setting in settings(result) if setting.at == at]
+    return _at(settings(result), at)
 
 
-def references(result: StudyResult) -> list[Setting]:
-    """The reference and its coarser copy, at every point of the scene's axes."""
-    return [setting for setting in result.judged if setting.method in (REFERENCE, COARSER)]
+def references_at(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
+    """The reference and its coarser copy there."""
+    return _at(result.table[result.table.method.isin([REFERENCE, COARSER])], at)
 
 
 def full_methods(result: StudyResult) -> list[str]:
@@ -55,55 +63,85 @@ def full_methods(result: StudyResult) -> list[str]:
 
 def points(result: StudyResult) -> list[Mapping[str, Any]]:
     """The points of the scene's axes, [{}] for a study without."""
-    return list({key_of(row.parameters["at"]): row.parameters["at"] for row in result.rows}.values())
+    return result.runs.drop_duplicates("point")["at"].tolist()
 
 
-def front(settings: Sequence[Setting]) -> list[Setting]:
+def front(table: pd.DataFrame) -> pd.DataFrame:
     """Those that no other one beats in time and error both, fastest first; of equal ones the first."""
-    best, kept = math.inf, []
-    known = [(s.online_s, s.error, s) for s in settings if s.online_s is not None and s.error is not None]
-    for _, error, setting in sorted(known, key=lambda each: each[:2]):
-        if error < best:
-            best = error
-            kept.append(setting)
-    return kept
+    known = table.dropna(subset=["online_s", "error"]).sort_values(["online_s", "error"], kind="stable")
+    return known[known.error < known.error.cummin().shift(fill_value=math.inf)]
 
 
-def cheapest(settings: Sequence[Setting], tolerance: float, lasting: bool = False) -> dict[str, Setting | None]:
-    """For each method the fastest setting whose error holds the tolerance; None where there is none.
+def cheapest(result: StudyResult, at: Mapping[str, Any], tolerance: float, lasting: bool = False) -> pd.DataFrame:
+    """Every method's fastest setting whose error holds the tolerance at one point, the fastest method first.
 
-    lasting: whether its lasting error has to.
+    A line for each method, empty where none of its settings holds it. faster: online time of the fastest full model
+    that does over its own. lasting: whether the lasting error has to hold it.
     """
-    chosen = [s for s in settings if _holds(s.lasting_error if lasting else s.error, tolerance)]
-    return {name: next(iter(front([s for s in chosen if s.method == name])), None) for name in names_of(settings)}
+    drawn = settings_at(result, at)
+    holds = drawn[(drawn.lasting_error if lasting else drawn.error) <= tolerance].dropna(subset="online_s")
+    best = holds.sort_values(["online_s", "error"], kind="stable").groupby("method", sort=False).head(1)
+    others = pd.DataFrame({"method": [name for name in drawn.method.unique() if name not in set(best.method)]})
+    full = best.online_s[best.method.isin(full_methods(result))].min()
+    return pd.concat([best.assign(faster=full / best.online_s), others], ignore_index=True)
 
 
-def times_faster(chosen: Mapping[str, Setting | None], full: Sequence[str]) -> dict[str, float | None]:
-    """For each method: online time of the fastest chosen full model over its own; None where either is missing."""
-    known = {name: s.online_s for name, s in chosen.items() if s is not None and s.online_s is not None}
-    base = min((known[name] for name in full if name in known), default=None)
-    return {name: base / known[name] if base is not None and name in known else None for name in chosen}
+def most_accurate(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
+    """Every method's most accurate setting at one point of the scene's axes."""
+    known = settings_at(result, at).dropna(subset="error")
+    return known.loc[known.groupby("method", sort=False).error.idxmin()]
+
+
+def over_all_points(result: StudyResult) -> pd.DataFrame:
+    """Of each setting, method by method: points with an error, its median and largest, and the median time [s]."""
+    table = settings(result)
+    named = table.assign(setting=[words(setting) or "–" for setting in table.setting])
+    of_setting = named.astype({"online_s": float}).groupby(["method", "setting"], sort=False)
+    return of_setting.agg(
+        points=("error", "count"), median=("error", "median"), worst=("error", "max"), online_s=("online_s", "median")
+    ).reset_index()
+
+
+def stiff_errors(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
+    """Of the settings with rigid levels at one point that ran: their errors against stiff stops as well.
+
+    stiff_error: the largest NRMSE of the judged points; stiff_uncertainty: the stiff stops' own.
+    """
+    drawn = settings_at(result, at)
+    kept = drawn.measures.map(lambda each: each.get("stiff_stops", {}))
+    errors, own = (
+        pd.Series([worst_judged(result, each.get(name, {})) for each in kept], drawn.index, float)
+        for name in ("errors", "uncertainty")
+    )
+    found = drawn.assign(stiff_error=errors, stiff_uncertainty=own)
+    return found.dropna(subset=["stiff_error", "stiff_uncertainty"])
+
+
+def indicators(result: StudyResult) -> pd.DataFrame:
+    """method, indicator, error (NaN without) of every run that has an indicator, nearby ones included."""
+    runs = result.runs[~result.runs.method.isin([REFERENCE, COARSER])]
+    given = runs.measures.map(lambda each: each.get("indicator")).astype(float)
+    return runs.assign(indicator=given)[["method", "indicator", "error"]].dropna(subset="indicator")
+
+
+def rank_correlation(pairs: pd.DataFrame) -> tuple[float | None, int]:
+    """Spearman's rank correlation of indicator and error, None without meaning, and of how many runs it is."""
+    known = pairs[pairs.error >= ROUND_OFF]
+    if len(known) < FEWEST or known.indicator.nunique() < 2 or known.error.nunique() < 2:
+        return None, len(known)
+    return float(known.indicator.corr(known.error, method="spearman")), len(known)
 
 
 def uncertainty(result: StudyResult, at: Mapping[str, Any]) -> float | None:
     """Error of the reference's coarser copy: smaller differences to the reference say nothing."""
-    return next((s.own_error for s in _coarser(result, at)), None)
+    known = _coarser(result, at).own_error.dropna()
+    return None if known.empty else float(known.iloc[0])
 
 
 def pointwise_until(result: StudyResult, at: Mapping[str, Any], tolerance: float) -> float | None:
     """From when on [s] pointwise comparison has lost its meaning: the coarser copy's agreement horizon."""
-    return next((s.values.get("horizon", {}).get(f"{tolerance:g}") for s in _coarser(result, at)), None)
-
-
-def words(fields: Mapping[str, Any]) -> str:
-    """Fields of a setting or of a point as an engineer would say them: "r = 8, step 70 µs"."""
-    return ", ".join(_word(field, value) for field, value in fields.items())
-
-
-def named(setting: Setting) -> str:
-    """A setting in words: "multiphi (r = 8)"."""
-    fields = words(setting.setting)
-    return f"{setting.method} ({fields})" if fields else setting.method
+    horizons = (each.get("horizon", {}).get(f"{tolerance:g}") for each in _coarser(result, at).measures)
+    return next(horizons, None)
 
 
 def longest(result: StudyResult) -> float:
@@ -111,17 +149,23 @@ def longest(result: StudyResult) -> float:
     return max((float(w) for row in result.rows for w in row.values.get("nrmse", {})), default=0.0)
 
 
-def names_of(settings: Sequence[Setting]) -> list[str]:
-    """The methods that settings belong to, each once, in order."""
-    return list(dict.fromkeys(setting.method for setting in settings))
+def words(fields: Mapping[str, Any]) -> str:
+    """Fields of a setting or of a point as an engineer would say them: "r = 8, step 70 µs"."""
+    return ", ".join(_word(field, value) for field, value in fields.items())
 
 
-def _coarser(result: StudyResult, at: Mapping[str, Any]) -> list[Setting]:
-    return [s for s in references(result) if s.method == COARSER and s.at == at]
+def named(method: str, setting: Mapping[str, Any]) -> str:
+    """A setting in words: "multiphi (r = 8)"."""
+    return f"{method} ({words(setting)})" if setting else method
 
 
-def _holds(error: float | None, tolerance: float) -> bool:
-    return error is not None and error <= tolerance
+def _at(table: pd.DataFrame, at: Mapping[str, Any]) -> pd.DataFrame:
+    return table[table.point == key_of(at)]
+
+
+def _coarser(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
+    there = references_at(result, at)
+    return there[there.method == COARSER]
 
 
 def _word(field: str, value: Any) -> str:

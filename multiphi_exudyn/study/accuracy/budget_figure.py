@@ -1,29 +1,29 @@
 """The picture of error budgets, from their stored values: parts, their uncertainties, and the total.
 
 One panel per budget; in it, for each window and each ladder, a group of bars: the size of every part on a logarithmic
-axis with a whisker of its uncertainty, the total as a line across the group, and above it each part's share. A pale
-bar is no larger than its uncertainty. Colours by cause, from the colour-blind-safe set of all pictures; grey: the
-joined causes on both sides of a missing rung.
+axis with a whisker of its uncertainty and its share above, the total as a line across the group. A pale bar is no
+larger than its uncertainty. Colours by cause; grey: the joined causes on both sides of a missing rung.
 """
 
 from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
+from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.study.accuracy.budget import CAUSES, Budget
-from multiphi_exudyn.study.comparison.plots import COLOURS, FULL, REFERENCE, RESOLUTION, WIDTH
+from multiphi_exudyn.study.comparison.figure_style import COLOURS, FULL, NOTE, REFERENCE, STYLE, WIDTH
 
 __all__ = ["budget_figure"]
 
@@ -34,22 +34,10 @@ FLOOR = 1e-13  # of ||y_ref||: round-off; smaller bars lie below the picture
 HIGHEST = 50.0  # of ||y_ref||: room for shares and causes above the largest differences
 LINE_LENGTH = 110  # characters of a missing rung's cause
 COLOUR_OF = dict(zip(CAUSES, COLOURS, strict=False))
+TOTAL: dict[str, Any] = {"color": REFERENCE, "ls": "--", "lw": 1.4}
 
 
-@dataclass(frozen=True)
-class Group:
-    """The bars of one window and ladder, from ``left`` on, one unit apart."""
-
-    until: str
-    ladder: str
-    left: float
-    content: Mapping[str, Any]
-
-    @property
-    def middle(self) -> float:
-        return self.left + (len(self.content["parts"]) - 1) / 2
-
-
+@rc_context(STYLE)
 def budget_figure(budgets: Mapping[str, Any] | Budget | Sequence[Mapping[str, Any] | Budget]) -> Figure:
     """Panels of one or several budgets, given as such or as their values."""
     given = [budgets] if isinstance(budgets, (Mapping, Budget)) else list(budgets)
@@ -58,66 +46,53 @@ def budget_figure(budgets: Mapping[str, Any] | Budget | Sequence[Mapping[str, An
     values = [each.values() if isinstance(each, Budget) else each for each in given]
     columns = min(COLUMNS, len(values))
     rows = math.ceil(len(values) / columns)
-    figure = Figure(
-        figsize=(WIDTH * (1 + columns) / 2, PANEL_HEIGHT * rows + 0.6), dpi=RESOLUTION, layout="constrained"
-    )
-    FigureCanvasAgg(figure)
+    figure = Figure(figsize=(WIDTH * (1 + columns) / 2, PANEL_HEIGHT * rows + 0.6))
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
+    causes: set[str] = set()
     for axes, each in zip(panels, values, strict=False):
-        _panel(axes, each)
-        if axes.get_subplotspec().is_first_col():
-            axes.set_ylabel("difference [% of the reference]", fontsize=9)
+        causes |= _panel(axes, each)
     for axes in panels[len(values) :]:
         axes.set_visible(False)
-    _legend(figure, values)
+    handles: list[Any] = [Patch(color=COLOUR_OF[cause], label=cause) for cause in CAUSES if cause in causes]
+    handles += [Patch(color=FULL, label=cause) for cause in sorted(causes - set(CAUSES))]
+    handles.append(Line2D([], [], **TOTAL, label="total, full beam to user object; above bars: shares of it [%]"))
+    handles.append(Line2D([], [], color=REFERENCE, lw=0.9, marker="_", label="uncertainty; pale: larger than the part"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
 
-def _groups(values: Mapping[str, Any]) -> Iterator[Group]:
-    left = 0.0
+def _panel(axes: Axes, values: Mapping[str, Any]) -> set[str]:
+    """All groups of bars of one budget; the causes that are drawn."""
+    left, places, causes = 0.0, {}, set[str]()
     for until, ladders in values["windows"].items():
-        for ladder, contents in ladders.items():
-            if contents["all"] is not None:
-                yield Group(until, ladder, left, contents["all"])
-                left += len(contents["all"]["parts"]) + 1
-
-
-def _panel(axes: Axes, values: Mapping[str, Any]) -> None:
-    groups = list(_groups(values))
-    for group in groups:
-        _bars(axes, group)
-    axes.set_yscale("log")
-    axes.set_ylim(100 * FLOOR, 100 * HIGHEST)
-    axes.set_xticks(
-        [group.middle for group in groups], [f"{g.ladder} contacts\nto {g.until} s" for g in groups], fontsize=8
-    )
+        for ladder, groups in ladders.items():
+            if groups["all"] is not None:
+                parts = pd.DataFrame(groups["all"]["parts"])
+                _bars(axes, left + np.arange(len(parts)), parts, groups["all"]["total"])
+                places[left + (len(parts) - 1) / 2] = f"{ladder} contacts\nto {until} s"
+                left += len(parts) + 1
+                causes |= set(parts.cause)
+    axes.set(yscale="log", ylim=(100 * FLOOR, 100 * HIGHEST), ylabel="difference [% of the reference]")
+    axes.set_xticks(list(places), list(places.values()))
     axes.tick_params(axis="x", length=0)
-    axes.tick_params(axis="y", labelsize=8)
-    axes.set_title(_title(values), fontsize=10)
-    axes.grid(axis="y", color="#EEEEEE")
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-    missing = _missing(values)
-    if missing:
-        axes.text(0.01, 0.99, missing, transform=axes.transAxes, fontsize=7, va="top", color="#444444")
+    axes.tick_params(labelsize=8)
+    axes.grid(visible=False, axis="x")
+    axes.set_title(_title(values))
+    axes.label_outer()
+    axes.text(0.01, 0.99, _missing(values), transform=axes.transAxes, fontsize=7, va="top", color=NOTE)
+    return causes
 
 
-def _bars(axes: Axes, group: Group) -> None:
-    for i, part in enumerate(group.content["parts"]):
-        x, size, uncertainty = group.left + i, part["size"], part["uncertainty"]
-        opacity = PALE if part["significant"] is False else 1.0
-        colour = COLOUR_OF.get(part["cause"], FULL)
-        axes.bar(x, 100 * max(size, FLOOR), bottom=0, width=0.8, color=colour, alpha=opacity, lw=0)
-        if uncertainty is not None:
-            ends = 100 * np.array([max(size - uncertainty, FLOOR), max(size + uncertainty, FLOOR)])
-            axes.plot([x, x], ends, color=REFERENCE, lw=0.9)
-            axes.plot([x - 0.15, x + 0.15], [ends[1]] * 2, color=REFERENCE, lw=0.9)
-        if part["share"] is not None:
-            share = f"{percent:+d}" if (percent := round(100 * part["share"])) else "0"
-            top = max(100 * group.content["total"], 100 * (size + (uncertainty or 0.0)))
-            axes.annotate(share, (x, top), (0, 3), textcoords="offset points", ha="center", fontsize=6.5)
-    ends = np.array([-0.5, len(group.content["parts"]) - 0.5])
-    axes.plot(group.left + ends, [100 * group.content["total"]] * 2, color=REFERENCE, lw=1.4, ls="--")
+def _bars(axes: Axes, places: np.ndarray, parts: pd.DataFrame, total: float) -> None:
+    heights = 100 * np.maximum(parts["size"], FLOOR)
+    spread = 100 * parts.uncertainty.astype(float)
+    whiskers = [np.minimum(spread, heights - 100 * FLOOR), spread]
+    pairs = zip(parts.cause, parts.significant, strict=True)
+    colours = [to_rgba(COLOUR_OF.get(cause, FULL), PALE if known is False else 1.0) for cause, known in pairs]
+    bars = axes.bar(places, heights, 0.8, yerr=whiskers, color=colours, error_kw={"lw": 0.9, "capsize": 2})
+    shares = [round(share) for share in 100 * parts.share.astype(float).fillna(0.0)]
+    axes.bar_label(bars, [f"{share:+d}" if share else "0" for share in shares], padding=2, fontsize=6.5)
+    axes.plot(places[[0, -1]] + [-0.5, 0.5], [100 * total] * 2, **TOTAL)
 
 
 def _title(values: Mapping[str, Any]) -> str:
@@ -128,20 +103,5 @@ def _title(values: Mapping[str, Any]) -> str:
 
 def _missing(values: Mapping[str, Any]) -> str:
     """One line for each rung that failed, with its cause."""
-    failed = [rung for rung in values["rungs"].values() if rung["status"] != "ok"]
-    return "\n".join(
-        textwrap.shorten(f"missing: {r['label']}: {r['message']}", LINE_LENGTH, placeholder=" …") for r in failed
-    )
-
-
-def _legend(figure: Figure, values: Sequence[Mapping[str, Any]]) -> None:
-    shown = {part["cause"] for each in values for group in _groups(each) for part in group.content["parts"]}
-    handles: list[Any] = [Patch(color=COLOUR_OF[cause], label=cause) for cause in CAUSES if cause in shown]
-    handles += [Patch(color=FULL, label=cause) for cause in sorted(shown - set(CAUSES))]
-    handles.append(
-        Line2D(
-            [], [], color=REFERENCE, ls="--", lw=1.4, label="total, full beam to user object; above: shares of it [%]"
-        )
-    )
-    handles.append(Line2D([], [], color=REFERENCE, lw=0.9, marker="_", label="uncertainty; pale: larger than the part"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+    failed = [f"missing: {r['label']}: {r['message']}" for r in values["rungs"].values() if r["status"] != "ok"]
+    return "\n".join(textwrap.shorten(each, LINE_LENGTH, placeholder=" …") for each in failed)

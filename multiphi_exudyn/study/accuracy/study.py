@@ -10,19 +10,19 @@ was; maps are made anew with every report.
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
+from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.study.accuracy.analysis import settings
+from multiphi_exudyn.study.accuracy.analysis import most_accurate
 from multiphi_exudyn.study.accuracy.budget import budget
 from multiphi_exudyn.study.accuracy.cases import CASE, Parameters, Study
-from multiphi_exudyn.study.accuracy.study_result import MapPair, Setting, StudyResult
+from multiphi_exudyn.study.accuracy.study_result import MapPair, StudyResult
 from multiphi_exudyn.study.measures.measures import measures
 from multiphi_exudyn.study.measures.spectra import FEWEST, FREQUENCIES, wavelet_map
 from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models, stiff_stops
@@ -130,10 +130,17 @@ def _stored(store: Store, case: Parameters) -> ModelRun | None:
 
 
 def _stiff(study: Study, cases: Sequence[Parameters], store: Store) -> StiffStops | None:
-    """What rigid levels at one point of the axes are measured against too; None where no case with any is left."""
+    """What rigid levels at one point of the axes are measured against too; None where no case with any is left.
+
+    A method that its scene refuses there has no levels; its runs say why.
+    """
     pending = {case["method"]: case for case in cases if store.find(ERRORS, case) is None}
-    found = (stiff_stops(_bench(study, case)) for case in pending.values())
-    return next((stiff for stiff in found if stiff is not None), None)
+    for case in pending.values():
+        with contextlib.suppress(MultiPhiValueError):
+            stiff = stiff_stops(_bench(study, case))
+            if stiff is not None:
+                return stiff
+    return None
 
 
 def _bench(study: Study, parameters: Mapping[str, Any]) -> Workbench:
@@ -181,21 +188,19 @@ def _assumptions(study: Study) -> tuple[str, ...]:
 
 def _maps(study: Study, result: StudyResult, full: ModelRun) -> Iterator[MapPair]:
     """Of the methods asked for, at the first point of the axes: the most accurate setting beside the reference."""
-    known = [s for s in settings(result) if s.error is not None and s.at == study.points[0]]
+    best = most_accurate(result, study.points[0])
     for name in study.file.maps:
-        best = min((s for s in known if s.method == name), key=lambda s: s.error or 0.0, default=None)
-        if best is not None:
-            yield from _pairs(study, best, full)
+        for setting in best.setting[best.method == name]:
+            yield from _pairs(study, (name, setting), full)
 
 
-def _pairs(study: Study, setting: Setting, full: ModelRun) -> Iterator[MapPair]:
-    case = next(c for c in study.runs(setting.at) if (c["method"], c["setting"]) == (setting.method, setting.setting))
+def _pairs(study: Study, chosen: tuple[str, Mapping[str, Any]], full: ModelRun) -> Iterator[MapPair]:
+    """A method and its setting beside the reference."""
+    case = next(case for case in study.runs(study.points[0]) if (case["method"], case["setting"]) == chosen)
     bench = replace(_bench(study, case), repeats=0)
     run = run_model(bench, CASE, progress=False)
-    if not run.ok or not np.any(FREQUENCIES * FEWEST * bench.scene.file.outputs.interval <= 1):
-        return
     frequencies = FREQUENCIES[FREQUENCIES * FEWEST * bench.scene.file.outputs.interval <= 1]
-    for point in bench.points:
+    for point in bench.points if run.ok and len(frequencies) else ():
         yield MapPair(
             point=point,
             label=run.label,

@@ -4,68 +4,62 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from typing import Any
 
+import pandas as pd
 from matplotlib.figure import Figure
 
 from multiphi_exudyn.study.accuracy import study_figures
-from multiphi_exudyn.study.accuracy.along_axis import Series, numeric_axes, series, tables_along
+from multiphi_exudyn.study.accuracy.along_axis import numeric_axes, series, tables_along
 from multiphi_exudyn.study.accuracy.analysis import (
+    cheapest,
     full_methods,
-    names_of,
+    indicators,
+    most_accurate,
+    over_all_points,
     points,
-    references,
-    settings,
+    rank_correlation,
+    references_at,
     settings_at,
+    stiff_errors,
     uncertainty,
     words,
 )
 from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
-from multiphi_exudyn.study.accuracy.indicator import indicators, rank_correlation
 from multiphi_exudyn.study.accuracy.map_figure import map_figure
-from multiphi_exudyn.study.accuracy.overview import over_all_points, response_figure
-from multiphi_exudyn.study.accuracy.stiff_errors import StiffError, stiff_errors
-from multiphi_exudyn.study.accuracy.study_findings import (
-    choices,
-    error_words,
-    findings,
-    most_accurate,
-    shown_points,
-)
-from multiphi_exudyn.study.accuracy.study_result import Setting, StudyResult
-from multiphi_exudyn.study.accuracy.study_zoom import error_against_time
-from multiphi_exudyn.study.comparison.pages import environment_of
-from multiphi_exudyn.study.comparison.plots import data_uri
-from multiphi_exudyn.study.comparison.wording import percent
+from multiphi_exudyn.study.accuracy.study_findings import error_words, findings, records, shown_points
+from multiphi_exudyn.study.accuracy.study_result import StudyResult
+from multiphi_exudyn.study.comparison.pages import Picture, environment_of
+from multiphi_exudyn.study.comparison.wording import percent, seconds
 from multiphi_exudyn.study.measures import metrics
 
 __all__ = ["render_study"]
 
 TEMPLATE = "study.html.j2"
 MOST_FAILURES = 100  # listed on the page; the CSV file has all
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A figure as a data URI, with its caption."""
-
-    source: str
-    caption: str
-
-
-@dataclass(frozen=True)
-class Point:
-    """What is shown for one point of the scene's axes."""
-
-    at: Mapping[str, Any]
-    uncertainty: float | None
-    pareto: Picture | None
-    convergence: Picture | None
-    lines: tuple[Series, ...]
-    stiff: tuple[StiffError, ...]
-    contact: tuple[Setting, ...]
+PARETO = (
+    "A line joins those settings of a method that none of its other settings beats in both time and error. In the "
+    "grey band a model is as good as the reference can tell. Thin lines: the tolerances of the table below. "
+    "Colours are the same in all pictures."
+)
+CONVERGENCE = (
+    "In brackets: the other fields, each at its finest. Order: observed between neighbouring values. ×: failed."
+)
+ALONG = "Every method at its finest setting; gaps: failed."
+RESPONSE = "The reference, at the points of the scene's axes."
+INDICATOR = (
+    "Every run that has an indicator, nearby ones included. On the line the prediction is exact. It predicts what "
+    "truncation costs, not what a contact law other than the reference's does."
+)
+BUDGET = (
+    "Bars: size of each part, whiskers its uncertainty, numbers its share of the whole difference in %. "
+    "Pale: no larger than its uncertainty. Dashed line: the whole difference between full and reduced."
+)
+MAPS = (
+    "The reference and {}. Dashed: natural frequencies of the levels [Hz]. Hatched: the ends of the record show. "
+    "Grey bars on top: in contact."
+)
 
 
 def render_study(result: StudyResult) -> str:
@@ -73,26 +67,32 @@ def render_study(result: StudyResult) -> str:
     environment = environment_of(__package__ or "")
     environment.filters |= {"words": words, "cell": cell_words}
     shown = [_point(result, at) for at in shown_points(result)]
-    failed = [row for row in (*result.rows, *result.timings, *result.budgets) if row.status != "ok"]
+    timed = [point for point in shown if point["pareto"]]
     return environment.get_template(TEMPLATE).render(
+        name=result.name,
+        title=result.study.title,
+        findings=findings(result),
+        definitions=metrics.METRICS.values(),
+        assumptions=result.assumptions,
+        environment=result.environment,
         result=result,
         study=result.study,
-        findings=findings(result),
         shown=shown,
-        zoom=[error_against_time(result, point.at, k) for k, point in enumerate(shown) if point.pareto],
+        timed=timed,
+        zoom=[study_figures.error_against_time(result, point["at"], k) for k, point in enumerate(timed)],
         count=len(points(result)),
-        choices=choices,
         kinds=[False, True] if any(method.refine for method in result.study.methods) else [False],
+        cheapest=lambda *asked: records(cheapest(result, *asked)),
         full=full_methods(result),
         error_words=error_words,
-        overall=over_all_points(result).to_dict("records") if len(points(result)) > 1 else [],
-        response=_response(result),
-        along=[(axis, _along(result, axis), tables_along(result, axis)) for axis in _axes(result)],
-        indicator=_indicator(result),
+        overall=_overall(result) if len(points(result)) > 1 else None,
+        response=_drawn(study_figures.response_figure(result), RESPONSE),
+        along=[_along(result, axis) for axis in numeric_axes(result.table, "at")],
+        indicator=_drawn(study_figures.indicator_figure(result), INDICATOR),
         correlations=_correlations(result),
         budget=_budget(result),
         maps=list(_maps(result)),
-        failed=failed,
+        failed=[row for row in (*result.rows, *result.timings, *result.budgets) if row.status != "ok"],
         most_failures=MOST_FAILURES,
         metrics=metrics.METRICS,
     )
@@ -112,89 +112,62 @@ def cell_words(value: float | None, quantity: str) -> str:
     return f"{value:.4g}{units.get(quantity, '')}"
 
 
-def _point(result: StudyResult, at: Mapping[str, Any]) -> Point:
+def _point(result: StudyResult, at: Mapping[str, Any]) -> dict[str, Any]:
+    """What is shown for one point of the scene's axes."""
     drawn = settings_at(result, at)
-    lines = [series(drawn, name, axis) for axis in numeric_axes(drawn, of_scene=False) for name in names_of(drawn)]
-    return Point(
-        at,
-        uncertainty(result, at),
-        _pareto(result, at, drawn),
-        _convergence(result, at),
-        tuple(line for line in lines if line is not None),
-        tuple(stiff_errors(result, at)),
-        tuple(s for s in (*_references(result, at), *most_accurate(result, at)) if s.values.get("first_contact")),
-    )
+    known = drawn.dropna(subset=["online_s", "error"])
+    axes, methods = numeric_axes(drawn, "setting"), drawn.method.unique()
+    touched = pd.concat([references_at(result, at), most_accurate(result, at)])
+    return {
+        "at": at,
+        "uncertainty": uncertainty(result, at),
+        "pareto": Picture.of(study_figures.pareto_figure(result, at), PARETO) if len(known) else None,
+        "convergence": _drawn(study_figures.convergence_figure(result, at), CONVERGENCE),
+        "lines": [line for axis in axes for name in methods if (line := series(drawn, name, axis))],
+        "stiff": records(stiff_errors(result, at)),
+        "contact": [each for each in records(touched) if each["measures"].get("first_contact")],
+    }
 
 
-def _pareto(result: StudyResult, at: Mapping[str, Any], drawn: list[Setting]) -> Picture | None:
-    if not any(setting.online_s is not None and setting.error is not None for setting in drawn):
-        return None
-    return _picture(
-        study_figures.pareto_figure(result, at),
-        "A line joins those settings of a method that none of its other settings beats in both time and error. In the "
-        "grey band a model is as good as the reference can tell. Thin lines: the tolerances of the table below. "
-        "Colours are the same in all pictures.",
-    )
+def _drawn(figure: Figure | None, caption: str) -> Picture | None:
+    return None if figure is None else Picture.of(figure, caption)
 
 
-def _convergence(result: StudyResult, at: Mapping[str, Any]) -> Picture | None:
-    figure = study_figures.convergence_figure(result, at)
-    caption = (
-        "In brackets: the other fields, each at its finest. Order: observed between neighbouring values. ×: failed."
-    )
-    return None if figure is None else _picture(figure, caption)
+def _overall(result: StudyResult) -> pd.DataFrame:
+    """Every setting over all points, in words."""
+    table = over_all_points(result).set_index("method")
+    words_of = {"median": percent, "worst": percent, "online_s": seconds}
+    named = {"points": "points with an error", "median": "error, median", "worst": "error, largest"}
+    in_words = table.assign(**{column: table[column].map(tell) for column, tell in words_of.items()})
+    return in_words.rename(columns={**named, "online_s": "online, median"}).rename_axis(index=None, columns="method")
 
 
-def _axes(result: StudyResult) -> list[str]:
-    return numeric_axes([*references(result), *settings(result)], of_scene=True)
+def _along(result: StudyResult, axis: str) -> tuple[str, Picture, list[pd.DataFrame]]:
+    """An axis of the scene, its picture, and a table in words for each quantity."""
+    tables = []
+    for column, table in tables_along(result, axis).items():
+        quantity, _, name = column.partition(".")
+        label = metrics.METRICS[quantity].label if quantity in metrics.METRICS else "error"
+        in_words = table.map(cell_words, quantity=quantity).rename(columns="{:g}".format)
+        tables.append(in_words.rename_axis(index=None, columns=", ".join(filter(None, (label, name)))))
+    return axis, Picture.of(study_figures.along_figure(result, axis), ALONG), tables
 
 
-def _along(result: StudyResult, axis: str) -> Picture:
-    return _picture(study_figures.along_figure(result, axis), "Every method at its finest setting; gaps: failed.")
-
-
-def _references(result: StudyResult, at: Mapping[str, Any]) -> list[Setting]:
-    return [setting for setting in references(result) if setting.at == at]
-
-
-def _response(result: StudyResult) -> Picture | None:
-    figure = response_figure(result)
-    return None if figure is None else _picture(figure, "The reference, at the points of the scene's axes.")
-
-
-def _indicator(result: StudyResult) -> Picture | None:
-    figure = study_figures.indicator_figure(result)
-    caption = (
-        "Every run that has an indicator, nearby ones included. On the line the prediction is exact. It predicts what "
-        "truncation costs, not what a contact law other than the reference's does."
-    )
-    return None if figure is None else _picture(figure, caption)
-
-
-def _correlations(result: StudyResult) -> dict[str, tuple[float | None, int, int]]:
+def _correlations(result: StudyResult) -> pd.DataFrame:
     """By method, then of all together: the rank correlation, of how many runs, how many have an indicator."""
     pairs = indicators(result)
     found = {str(name): (*rank_correlation(own), len(own)) for name, own in pairs.groupby("method", sort=False)}
-    return found | ({"all": (*rank_correlation(pairs), len(pairs))} if len(found) > 1 else {})
+    found |= {"all": (*rank_correlation(pairs), len(pairs))} if len(found) > 1 else {}
+    lines = {name: ["–" if size is None else f"{size:.3f}", *counts] for name, (size, *counts) in found.items()}
+    columns = pd.Index(["rank correlation", "runs", "with an indicator"], name="method")
+    return pd.DataFrame.from_dict(lines, orient="index", columns=columns)
 
 
 def _budget(result: StudyResult) -> Picture | None:
     values = [row.values for row in result.budgets if row.values]
-    caption = (
-        "Bars: size of each part, whiskers its uncertainty, numbers its share of the whole difference in %. "
-        "Pale: no larger than its uncertainty. Dashed line: the whole difference between full and reduced."
-    )
-    return _picture(budget_figure(values), caption) if values else None
+    return Picture.of(budget_figure(values), BUDGET) if values else None
 
 
-def _maps(result: StudyResult) -> Iterable[Picture]:
+def _maps(result: StudyResult) -> Iterator[Picture]:
     for label, pairs in itertools.groupby(sorted(result.maps, key=lambda pair: pair.label), lambda pair: pair.label):
-        yield _picture(
-            map_figure(list(pairs)),
-            f"The reference and {label}. Dashed: natural frequencies of the levels [Hz]. Hatched: the ends of the "
-            "record show. Grey bars on top: in contact.",
-        )
-
-
-def _picture(figure: Figure, caption: str) -> Picture:
-    return Picture(data_uri(figure), caption)
+        yield Picture.of(map_figure(list(pairs)), MAPS.format(label))

@@ -1,4 +1,4 @@
-"""A study's result: its rows, and the settings they stand for, each with its error and its time.
+"""A study's result: its rows, a table with a line for each setting, and one with everything, as ``runs.csv`` has it.
 
 The error of a setting is the worst, over its nearby runs, of the largest NRMSE of the judged points from 0 to the
 study's window. Where one of these runs has no error the setting has none either: a gap with a cause, never a smaller
@@ -8,20 +8,23 @@ number. Everything is computed from the rows alone. Times in s.
 from __future__ import annotations
 
 import functools
+import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from multiphi_exudyn.study.accuracy.study_file import REFERENCE, StudyFile
 from multiphi_exudyn.study.measures.spectra import Map
-from multiphi_exudyn.study.sweep.store import Row, key_of
+from multiphi_exudyn.study.sweep.row import Row, key_of
 
-__all__ = ["MapPair", "Setting", "StudyResult", "error_of"]
+__all__ = ["MapPair", "StudyResult", "all_numbers", "csv_text", "error_of", "worst_judged"]
 
 COUNTS = ("modes", "elements")  # fields of which more are finer; of others less are
+TIMES = ["online_s", "first_s", "offline_s", "repeats_s"]
 
 Intervals = Sequence[Sequence[float]]
 
@@ -60,128 +63,106 @@ class StudyResult:
     quick: bool
 
     @functools.cached_property
-    def judged(self) -> tuple[Setting, ...]:
-        """Every setting with its error and time, the reference and its coarser copy included."""
-        timings = {_setting_key(row): row for row in self.timings}
-        groups: dict[str, list[Row]] = {}
-        for row in self.rows:
-            groups.setdefault(_setting_key(row), []).append(row)
-        alone = [_setting(self, group, timings.get(key)) for key, group in groups.items()]
-        lasting = _lasting(alone, {method.name: method.refine for method in self.study.methods})
-        return tuple(replace(each, lasting_error=worst) for each, worst in zip(alone, lasting, strict=True))
+    def runs(self) -> pd.DataFrame:
+        """A line for each run of the error pass.
 
+        key: of its setting; point: of its point of the scene's axes. at, setting, nearby: field -> value.
+        error: NaN without; cause: why there is none, or "". measures: all of them, by name.
+        """
+        lines = [
+            {
+                "key": _setting_key(row),
+                "point": key_of(row.parameters["at"]),
+                **row.parameters,
+                "error": error_of(self, row),
+                "cause": _cause(self, row),
+                "measures": row.values,
+            }
+            for row in self.rows
+        ]
+        columns = ["key", "point", "method", "at", "setting", "nearby", "error", "cause", "measures"]
+        return pd.DataFrame(lines, columns=columns).astype({"error": float})
 
-@dataclass(frozen=True)
-class Setting:
-    """One setting of a method at one point of the scene's axes.
+    @functools.cached_property
+    def table(self) -> pd.DataFrame:
+        """A line for each setting of a method at a point of the scene's axes, the references included.
 
-    error: the worst of the nearby runs; None where one of them has none, and message names the cause.
-    own_error: of the setting itself. lasting_error: the worst of it and of every finer setting that was tried, finer
-    in its method's field ``refine`` alone; of methods without such a field its error.
-    values, timing: of its own run in the error and in the timing pass, {} without.
-    """
+        error: the worst of the nearby runs; NaN where one of them has none, and message names the cause.
+        own_error: of the setting itself. lasting_error: the worst of it and of every finer setting that was tried,
+        finer in its method's field ``refine`` alone; of methods without such a field its error. measures: of its own
+        run. online_s, the median of repeats_s, first_s and offline_s are of the timing pass.
+        """
+        own = self.runs[self.runs.nearby.map(len) == 0].set_index("key")
+        of_setting = self.runs.assign(error=self.runs.error.fillna(math.inf)).groupby("key")
+        cause = of_setting.cause.agg(lambda causes: next(filter(None, causes), ""))
+        times = {_setting_key(row): dict(row.values) for row in self.timings if row.status == "ok"}
+        untimed = {
+            _setting_key(row): f"timing {row.status}: {row.message}" for row in self.timings if row.status != "ok"
+        }
+        table = own.rename(columns={"error": "own_error"}).assign(error=of_setting.error.max(), cause=cause)
+        table = table.join(pd.DataFrame.from_dict(times, orient="index").reindex(columns=TIMES))
+        table["message"] = table.cause.where(table.cause != "", [untimed.get(str(key), "") for key in table.index])
+        table["lasting_error"] = self._lasting(table)
+        return table.replace({"error": math.inf, "lasting_error": math.inf}, np.nan)
 
-    method: str
-    at: Mapping[str, Any]
-    setting: Mapping[str, Any]
-    error: float | None
-    own_error: float | None
-    message: str
-    values: Mapping[str, Any]
-    timing: Mapping[str, Any]
-    lasting_error: float | None = None
-
-    @property
-    def online_s(self) -> float | None:
-        """Median of the repeated runs."""
-        return self.timing.get("online_s")
-
-    @property
-    def spread(self) -> tuple[float, float] | None:
-        """The shortest and the longest of the repeated runs."""
-        repeats = self.timing.get("repeats_s")
-        return (min(repeats), max(repeats)) if repeats else None
-
-    @property
-    def first_s(self) -> float | None:
-        """The first run, which builds what the later ones find built."""
-        return self.timing.get("first_s")
-
-    @property
-    def offline_s(self) -> float | None:
-        """Before any run: structure, modes, static start."""
-        return self.timing.get("offline_s")
-
-    @property
-    def indicator(self) -> float | None:
-        """The model's own prediction of its error."""
-        return self.values.get("indicator")
-
-    @property
-    def dofs(self) -> int | None:
-        """Number of coordinates."""
-        return self.values.get("dofs")
+    def _lasting(self, table: pd.DataFrame) -> pd.Series:
+        """The worst error so far from the finest setting to the coarsest, of those alike but for one field."""
+        refine = {method.name: method.refine or "" for method in self.study.methods}
+        fields = table.method.map(refine).fillna("")
+        pairs = list(zip(fields, table.setting, strict=True))
+        alike = [key_of({name: value for name, value in given.items() if name != field}) for field, given in pairs]
+        order = [given.get(field, 0.0) * (-1 if field in COUNTS else 1) for field, given in pairs]
+        finest_first = table.assign(order=pd.array(order, float)).sort_values("order", kind="stable")
+        return finest_first.error.groupby([table.point, table.method, pd.Series(alike, table.index)]).cummax()
 
 
 def error_of(result: StudyResult, row: Row) -> float | None:
     """Largest NRMSE of the judged points in the window; None where one of them has none."""
-    of_points = row.values.get("nrmse", {}).get(f"{result.window:g}", {}) if row.status == "ok" else {}
-    errors = [of_points.get(point) for point in result.judged_points]
-    known = [error for error in errors if error is not None]
-    return max(known) if known and len(known) == len(errors) else None
+    return worst_judged(result, row.values.get("nrmse", {})) if row.status == "ok" else None
 
 
-def _setting(result: StudyResult, nearby: Sequence[Row], timing: Row | None) -> Setting:
-    errors = [error_of(result, row) for row in nearby]
-    known = [error for error in errors if error is not None]
-    own = next((row for row in nearby if not row.parameters["nearby"]), None)
-    parameters = nearby[0].parameters
-    return Setting(
-        parameters["method"],
-        parameters["at"],
-        parameters["setting"],
-        error=max(known) if len(known) == len(errors) else None,
-        own_error=None if own is None else error_of(result, own),
-        message=next(_causes(result, nearby, timing), ""),
-        values={} if own is None else own.values,
-        timing=timing.values if timing is not None and timing.status == "ok" else {},
-    )
+def worst_judged(result: StudyResult, by_window: Mapping[str, Mapping[str, float | None]]) -> float | None:
+    """The largest entry of the judged points in the study's window; None where one of them has none."""
+    of_points = by_window.get(f"{result.window:g}", {})
+    known = [of_points.get(point) for point in result.judged_points]
+    return max((each for each in known if each is not None), default=None) if None not in known else None
 
 
-def _causes(result: StudyResult, nearby: Sequence[Row], timing: Row | None) -> Iterator[str]:
-    """Why there is no error, or no time."""
-    for row in nearby:
-        if row.status != "ok":
-            yield f"{row.status}: {row.message}{_near(row)}"
-        elif row.parameters["method"] != REFERENCE and error_of(result, row) is None:
-            yield f"no error: nothing to compare it with{_near(row)}"
-    if timing is not None and timing.status != "ok":
-        yield f"timing {timing.status}: {timing.message}"
+def all_numbers(result: StudyResult) -> pd.DataFrame:
+    """One line for each run: its error pass, its timing and its budget; ``multiphi_exudyn.study.load`` says which."""
+    lines: dict[str, dict[str, Any]] = {}
+    for row in result.rows:
+        lines[key_of(row.parameters)] = {**row.parameters, **_of_run(row), "error": error_of(result, row)}
+    for name, rows in (("timing", result.timings), ("budget", result.budgets)):
+        for row in rows:
+            lines.setdefault(key_of(row.parameters), dict(row.parameters))[name] = _of_run(row)
+    return pd.json_normalize(list(lines.values()))
 
 
-def _near(row: Row) -> str:
-    factors = ", ".join(f"{field} × {factor:g}" for field, factor in row.parameters["nearby"].items())
-    return f" (nearby: {factors})" if factors else ""
+def csv_text(result: StudyResult) -> str:
+    """The same as CSV; lists are JSON."""
+
+    def text(cell: Any) -> Any:
+        return json.dumps(cell) if isinstance(cell, (list, tuple)) else cell
+
+    return all_numbers(result).map(text).to_csv(index=False, lineterminator="\n")
 
 
-def _lasting(settings: Sequence[Setting], refine: Mapping[str, str | None]) -> list[float | None]:
-    """Of each setting the worst error of it and of those that are finer in their method's field ``refine`` alone."""
-    rows = [_refined(setting, refine.get(setting.method) or "") for setting in settings]
-    frame = pd.DataFrame(rows, columns=["alike", "value", "error"]).astype({"value": float, "error": float})
-    worst = frame.sort_values("value").groupby("alike").error.cummax().sort_index()
-    return [None if math.isinf(error) else float(error) for error in worst]
-
-
-def _refined(setting: Setting, field: str) -> tuple[str, float, float]:
-    """What settings share that differ in one field at most, its value, finer ones first, and the error.
-
-    The error is infinite where there is none.
-    """
-    value = setting.setting.get(field, 0.0)
-    rest = {name: value for name, value in setting.setting.items() if name != field}
-    alike = key_of({"method": setting.method, "at": setting.at, "setting": rest})
-    return alike, -value if field in COUNTS else value, math.inf if setting.error is None else setting.error
+def _of_run(row: Row) -> dict[str, Any]:
+    of_run = {"status": row.status, "cause": row.message, "elapsed_s": row.elapsed_s, "finished": row.finished}
+    return {**of_run, **row.values}
 
 
 def _setting_key(row: Row) -> str:
     return key_of({field: row.parameters[field] for field in ("method", "at", "setting")})
+
+
+def _cause(result: StudyResult, row: Row) -> str:
+    """Why a run has no error; empty where it has one."""
+    factors = ", ".join(f"{field} × {factor:g}" for field, factor in row.parameters["nearby"].items())
+    near = f" (nearby: {factors})" if factors else ""
+    if row.status != "ok":
+        return f"{row.status}: {row.message}{near}"
+    if row.parameters["method"] != REFERENCE and error_of(result, row) is None:
+        return f"no error: nothing to compare it with{near}"
+    return ""

@@ -1,5 +1,5 @@
-"""All models of one scene side by side: figures, findings, report.
+"""Models side by side: compared, drawn and reported.
 
-Order: wording, pages, placement, compare, warned, contact_totals, losses, mode_shapes, direct_labels, plots,
-energy_plot, mode_plots, contact_plots, zoom, animation, findings, report.
+Order: wording, compare, beam_places, figure_style, losses, mode_shapes, plots, zoom, pages, run_warnings, findings,
+report, animation.
 """

@@ -16,19 +16,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.animation import FuncAnimation, PillowWriter
-from matplotlib.artist import Artist
+from matplotlib import rc_context
+from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import one_of
-from multiphi_exudyn.mechanics.beam import Beam
-from multiphi_exudyn.study.comparison.placement import meeting
-from multiphi_exudyn.study.comparison.plots import COLOURS, CONTACT, REFERENCE, greyed, panels
+from multiphi_exudyn.study.comparison.beam_places import coefficients
+from multiphi_exudyn.study.comparison.figure_style import BAND, COLOURS, REFERENCE, STYLE, panels
+from multiphi_exudyn.study.comparison.plots import greyed
 from multiphi_exudyn.study.comparison.wording import seconds
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
@@ -36,7 +35,7 @@ from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import Scene
 from multiphi_exudyn.study.scene.workbench import Workbench, mesh_nodes, prepare
 
-__all__ = ["FRAME_RATE", "Stage", "animation", "gif", "stage_of"]
+__all__ = ["FRAME_RATE", "Stage", "gif", "moving_figure", "stage_of"]
 
 FRAME_RATE = 25.0  # frames a second
 PERIOD_SHOWN = 10.0  # s, for the longest period of the open structure: bounces of a hundredth of it last several frames
@@ -47,6 +46,8 @@ COLOUR_COUNT = 48
 MARGIN = 0.12  # of the range of the heights, above and below
 CLOSED, OPEN = "#D55E00", "#BBBBBB"
 WIDTHS = (2.0, 4.5)  # points, of the reduced model and of the reference below it
+
+Move = Callable[[int], None]  # what a part of the picture does at a frame
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,10 @@ class Stage:
         """Both models, run; a failed one has its cause."""
         return {name: run_model(self.bench, name, progress, retry=True) for name in self.models}
 
+    def at(self, run: ModelRun, point: str) -> np.ndarray:
+        """Displacement [mm] of a point in every frame."""
+        return 1e3 * np.interp(self.time, run.time, run.points[point])
+
 
 def stage_of(scene: Scene, model: str | None = None, reference: str | None = None, slow: float | None = None) -> Stage:
     """Check what is asked for and build what both models share; none asked for: the scene's own.
@@ -79,27 +84,45 @@ def stage_of(scene: Scene, model: str | None = None, reference: str | None = Non
     Raises MultiPhiValueError, one line, for a model that cannot be drawn, matrices, and no or endless length.
     """
     models = _chosen(scene, model, reference)
-    comparison = scene.file.comparison.model_copy(update={"reference": models[1]})
-    scene = replace(scene, file=scene.file.model_copy(update={"comparison": comparison}))
+    scene = _changed(scene, comparison=scene.file.comparison.model_copy(update={"reference": models[1]}))
     mechanics = mechanics_of(scene)
     beams = mechanics.beams
     if beams is None:
         raise MultiPhiValueError(f"{scene.path}: structure: got matrices, need beams, whose shapes are drawn along x")
     mesh = mesh_nodes(scene, mechanics)
+    added = {name: {f"x = {place!r} m": place for place in x.tolist()} for name, x in mesh.items()}
+    nodes = {name: (x, tuple(f"{name}.{node}" if name else node for node in added[name])) for name, x in mesh.items()}
+    parts = {name: replace(beam, points={**beam.points, **added[name]}) for name, beam in beams.parts.items()}
     judged = scene.file.outputs.judged_points or scene.file.outputs.points or mechanics.points
-    nodes = {name: (x, tuple(f"{name}.{node}" if name else node for node in _nodes(x))) for name, x in mesh.items()}
-    touched = [point for contact in mechanics.contacts for point in meeting(contact)]
+    touched = [point for contact in mechanics.contacts for point in coefficients(contact)]
     shown = tuple(dict.fromkeys([*judged, *touched, *(point for _, points in nodes.values() for point in points)]))
-    outputs = scene.file.outputs.model_copy(update={"points": shown})
-    parts = {name: _with_nodes(beam, mesh[name]) for name, beam in beams.parts.items()}
-    whole = replace(mechanics, beams=replace(beams, parts=parts))
-    bench = prepare(replace(scene, file=scene.file.model_copy(update={"outputs": outputs})), whole)
-    factor = _checked(slow, bench.t_end) if slow is not None else _slow_motion(bench)
-    return Stage(replace(bench, repeats=1), models, tuple(judged), nodes, factor)
+    scene = _changed(scene, outputs=scene.file.outputs.model_copy(update={"points": shown}))
+    bench = replace(prepare(scene, replace(mechanics, beams=replace(beams, parts=parts))), repeats=1)
+    return Stage(
+        bench, models, tuple(judged), nodes, _slow_motion(bench) if slow is None else _checked(slow, bench.t_end)
+    )
+
+
+def _changed(scene: Scene, **fields: Any) -> Scene:
+    return replace(scene, file=scene.file.model_copy(update=fields))
+
+
+def gif(stage: Stage, runs: Mapping[str, ModelRun], drawn: Callable[[], object] = lambda: None) -> bytes:
+    """The animation of two finished runs, starting again at its end; drawn: called after every frame."""
+    figure, move = moving_figure(stage, runs)
+    writer = _FewColours(fps=int(FRAME_RATE))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "animation.gif"
+        with writer.saving(figure, path, RESOLUTION):
+            for frame in range(len(stage.time)):
+                move(frame)
+                writer.grab_frame()
+                drawn()
+        return path.read_bytes()
 
 
 class _FewColours(PillowWriter):
-    """Frames with one palette of few colours: a file a tenth as large."""
+    """Frames with one palette of few colours: a file a quarter as large."""
 
     _frames: list[Image.Image]
 
@@ -108,109 +131,82 @@ class _FewColours(PillowWriter):
         sample = self._frames[0].convert("RGB")
         sample.paste(CLOSED, (0, 0, 60, 60))  # a colour that the first frame need not have
         palette = sample.quantize(COLOUR_COUNT, dither=Image.Dither.NONE)
-        self._frames = [
-            frame.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE) for frame in self._frames
-        ]
+        frames = [frame.convert("RGB") for frame in self._frames]
+        self._frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
         super().finish()
 
 
-class _DrawnOnce(FigureCanvasAgg):
-    """Draws a frame as it is written, not as it is made too."""
-
-    def draw_idle(self, *_: Any, **__: Any) -> None:
-        """Nobody watches."""
-
-
-def animation(stage: Stage, runs: Mapping[str, ModelRun]) -> FuncAnimation:
-    """The animation of two finished runs, by the names of their models."""
+@rc_context(STYLE | {"axes.grid": False, "legend.fontsize": 9})
+def moving_figure(stage: Stage, runs: Mapping[str, ModelRun]) -> tuple[Figure, Move]:
+    """The picture of both runs, and what brings it to a frame."""
     reduced, reference = (runs[name] for name in stage.models)
-    names = list(stage.beams)
-    figure, axes = panels(1.2 + 2.4 * len(names) + 2.2, len(names) + 1, [1.0] * len(names) + [0.9])
-    figure.set_dpi(RESOLUTION)
-    _DrawnOnce(figure)
-    moved: list[Callable[[int], None]] = []
+    figure, axes = panels([*[2.6] * len(stage.beams), 2.3])
+    moves: list[Move] = []
     for run, colour, width in ((reference, REFERENCE, WIDTHS[1]), (reduced, COLOURS[0], WIDTHS[0])):
-        for beam, panel in zip(names, axes, strict=False):
-            moved.append(_line(stage, run, beam, panel, colour, width))
-            moved += _touching(stage, run, beam, panel, 2 * width)
-        moved.append(_history(stage, run, axes[-1], colour, width / 2))
+        for (beam, (x, nodes)), panel in zip(stage.beams.items(), axes, strict=False):
+            (line,) = panel.plot(x, x, color=colour, lw=width, label=run.name)
+            moves += [_shape(line, np.array([stage.at(run, node) for node in nodes]))]
+            moves += _stops(stage, run, beam, panel, 2 * width)
+        values = stage.at(run, _followed(stage, run))
+        axes[-1].plot(stage.time, values, color=OPEN, lw=width / 2, zorder=0)
+        (line,) = axes[-1].plot([], [], color=colour, lw=width / 2, marker="o", ms=width, markevery=[-1])
+        moves.append(_history(line, stage.time, values))
     _frame(stage, runs, figure, axes)
-    clock = axes[-1].text(1.0, 1.03, "", transform=axes[-1].transAxes, ha="right", fontsize=10)
+    clock = axes[-1].set_title("", fontsize=10, loc="right")
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # placed once, not in every frame
 
-    def show(frame: int) -> list[Artist]:
-        for move in moved:
-            move(frame)
+    def move(frame: int) -> None:
+        for each in moves:
+            each(frame)
         clock.set_text(f"t = {stage.time[frame]:.3f} s")
-        return []
 
-    return FuncAnimation(figure, show, frames=len(stage.time), init_func=list, repeat=True)
-
-
-def gif(moving: FuncAnimation, progress: Callable[[int, int], object] | None = None) -> bytes:
-    """The animation as a GIF that starts again at its end; progress: called with a frame's number and their count."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "animation.gif"
-        moving.save(path, _FewColours(fps=int(FRAME_RATE)), dpi=RESOLUTION, progress_callback=progress)
-        return path.read_bytes()
+    return figure, move
 
 
-def _line(stage: Stage, run: ModelRun, beam: str, axes: Axes, colour: str, width: float) -> Callable[[int], None]:
-    x, nodes = stage.beams[beam]
-    deflection = 1e3 * np.array([_at(stage, run, node) for node in nodes])
-    (line,) = axes.plot(x, deflection[:, 0], color=colour, lw=width, label=run.name)
+def _shape(line: Line2D, deflection: np.ndarray) -> Move:
     return lambda frame: line.set_ydata(deflection[:, frame])
 
 
-def _touching(stage: Stage, run: ModelRun, beam: str, axes: Axes, size: float) -> Iterator[Callable[[int], None]]:
+def _history(line: Line2D, time: np.ndarray, values: np.ndarray) -> Move:
+    return lambda frame: line.set_data(time[: frame + 1], values[: frame + 1])
+
+
+def _stops(stage: Stage, run: ModelRun, beam: str, axes: Axes, size: float) -> Iterator[Move]:
     """Where each contact of a beam would touch it: a mark that changes its colour while the contact is closed."""
     beams = stage.bench.mechanics.beams
     assert beams is not None, "checked when the stage was built"
     for contact in stage.bench.mechanics.contacts:
-        given = {contact.direction: 1.0} if isinstance(contact.direction, str) else contact.direction
-        for point in meeting(contact):
+        closed = _closed(run.contact_intervals[contact.name], stage.time)
+        gap = 1e3 * np.interp(stage.time, run.time, run.gaps[contact.name])
+        for point, c in coefficients(contact).items():
             name, along = beams.points[point]
             if name == beam:
-                c = given[point]
-                gap = np.interp(stage.time, run.time, run.gaps[contact.name])
-                z = 1e3 * (_at(stage, run, point) - gap / c)
-                closed = _closed(run.contact_intervals[contact.name], stage.time)
-                (mark,) = axes.plot([along], z[:1], marker="^" if c > 0 else "v", ms=size, ls="none", zorder=3)
-                yield _marked(mark, z, closed)
+                (mark,) = axes.plot([along], [0], marker="^" if c > 0 else "v", ms=size, ls="none", zorder=3)
+                yield _stop(mark, stage.at(run, point) - gap / c, closed)
 
 
-def _marked(mark: Line2D, z: np.ndarray, closed: np.ndarray) -> Callable[[int], None]:
+def _stop(mark: Line2D, z: np.ndarray, closed: np.ndarray) -> Move:
     def move(frame: int) -> None:
-        mark.set_ydata(z[frame : frame + 1])
-        mark.set_color(CLOSED if closed[frame] else OPEN)
+        mark.set(ydata=z[frame : frame + 1], color=CLOSED if closed[frame] else OPEN)
 
     return move
-
-
-def _history(stage: Stage, run: ModelRun, axes: Axes, colour: str, width: float) -> Callable[[int], None]:
-    values = 1e3 * _at(stage, run, _followed(stage, run))
-    axes.plot(stage.time, values, color=OPEN, lw=width, zorder=0)
-    (line,) = axes.plot([], [], color=colour, lw=width, marker="o", ms=2 * width, markevery=[-1])
-    return lambda frame: line.set_data(stage.time[: frame + 1], values[: frame + 1])
 
 
 def _frame(stage: Stage, runs: Mapping[str, ModelRun], figure: Figure, axes: list[Axes]) -> None:
     """Room for everything at any time, names, and grey where the reference is in contact."""
     reduced, reference = (runs[name] for name in stage.models)
     for (beam, (_, nodes)), panel in zip(stage.beams.items(), axes, strict=False):
-        z = 1e3 * np.array([_at(stage, run, node) for run in runs.values() for node in nodes])
+        z = np.array([stage.at(run, node) for run in runs.values() for node in nodes])
         room = MARGIN * np.ptp(z) or 1.0
-        panel.set_ylim(np.min(z) - room, np.max(z) + room)
-        panel.set_ylabel(f"{beam} w [mm]".strip())
+        panel.set(ylim=(np.min(z) - room, np.max(z) + room), ylabel=f"{beam} w [mm]".strip())
     axes[-2].set_xlabel("x [m]")
     spans, grey = greyed(reference)
     for start, end in spans:
-        axes[-1].axvspan(start, end, color=CONTACT, lw=0, zorder=-1)
+        axes[-1].axvspan(start, end, color=BAND, lw=0, zorder=-1)
     axes[-1].set(xlabel="time [s]", ylabel=f"{_followed(stage, reference)} [mm]", xlim=(0.0, stage.time[-1]))
-    if grey:
-        axes[-1].set_title(f"grey: {grey}", fontsize=9, loc="left")
-    axes[0].legend(loc="upper left", frameon=False, fontsize=9)
+    axes[-1].set_title(grey and f"grey: {grey}", fontsize=9)
+    axes[0].legend(loc="upper left")
     title = f"{stage.bench.scene.file.title}, {stage.slow:g} times slower than it happens"
     took = "; ".join(f"{run.label}: {seconds(run.online_s)}" for run in (reduced, reference))
     figure.suptitle(f"{title}\ncomputed in: {took}", fontsize=9)
@@ -219,10 +215,6 @@ def _frame(stage: Stage, runs: Mapping[str, ModelRun], figure: Figure, axes: lis
 def _followed(stage: Stage, run: ModelRun) -> str:
     """The judged point that moves most."""
     return max(stage.judged, key=lambda name: float(np.ptp(run.points[name])))
-
-
-def _at(stage: Stage, run: ModelRun, point: str) -> np.ndarray:
-    return np.interp(stage.time, run.time, run.points[point])
 
 
 def _closed(intervals: np.ndarray, time: np.ndarray) -> np.ndarray:
@@ -258,11 +250,3 @@ def _checked(slow: float, t_end: float) -> float:
     if not least <= slow <= most:
         raise MultiPhiValueError(f"--slow: got {slow:g}, need {least:.4g} to {most:.4g} for {t_end:g} s")
     return slow
-
-
-def _with_nodes(beam: Beam, x: np.ndarray) -> Beam:
-    return replace(beam, points={**beam.points, **_nodes(x)})
-
-
-def _nodes(x: np.ndarray) -> dict[str, float]:
-    return {f"x = {place!r} m": float(place) for place in x.tolist()}

@@ -6,6 +6,7 @@ written to disk.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -19,8 +20,11 @@ from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.model_kinds import ReducedModel, UserObjectModel
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF, Workbench
+from multiphi_exudyn.study.sweep.row import plain
 
-__all__ = ["Comparison", "compare", "histories", "summary"]
+__all__ = ["LISTED", "Comparison", "compare", "histories", "summary"]
+
+LISTED = 4  # contacts that pages tell of one by one; of more, what they did together
 
 
 @dataclass(frozen=True)
@@ -42,9 +46,8 @@ class Comparison:
 
     @property
     def coarser(self) -> ModelRun | None:
-        """The reference's coarser copy, if it ran."""
-        run = self.runs.get(self.bench.scene.file.comparison.coarser or "")
-        return run if run is not None and run.ok else None
+        """The reference's coarser copy, if it can be measured."""
+        return self.measured.get(self.bench.scene.file.comparison.coarser or "")
 
     @property
     def cheapest(self) -> tuple[ModelRun, ...]:
@@ -66,15 +69,6 @@ class Comparison:
         return {name: self.runs[name] for name in rigid_models(self.bench) if self.runs[name].ok}
 
     @property
-    def warnings(self) -> dict[str, list[str]]:
-        """Every sentence that a model warns with, and the names of the models that do, in the scene's order."""
-        found: dict[str, list[str]] = {}
-        for name, run in self.runs.items():
-            for sentence in run.warnings:
-                found.setdefault(sentence, []).append(name)
-        return found
-
-    @property
     def nudged(self) -> tuple[str, ...]:
         """Tolerances for which runs know their sensitivity horizon."""
         return tuple(dict.fromkeys(tolerance for run in self.runs.values() for tolerance in run.horizon_s))
@@ -88,6 +82,11 @@ class Comparison:
     def error(self, run: ModelRun, point: str, until: float) -> float:
         """NRMSE of a point to the reference from 0 to ``until`` [s]."""
         return metrics.nrmse(run.points[point], self.reference.points[point], run.time, until)
+
+    def errors(self, run: ModelRun) -> dict[str, dict[str, float | None]]:
+        """NRMSE by window and point."""
+        error = functools.partial(self.error, run)
+        return metrics.by_window(self.bench.windows, self.bench.points, error)
 
     def worst_error(self, run: ModelRun, until: float) -> float:
         """Largest NRMSE of the judged points."""
@@ -163,34 +162,30 @@ def compare(
 
 def summary(comparison: Comparison) -> dict[str, Any]:
     """The content of summary.json; numbers that do not exist are None. With friction it has ``stick_intervals``."""
-    outputs = comparison.bench.scene.file.outputs
-    errors = {name: _errors(comparison, run) for name, run in comparison.measured.items()}
-    coarser = comparison.coarser
-    known = coarser is not None and comparison.reference.ok
+    bench, runs, measured = comparison.bench, comparison.runs, comparison.measured
+    errors = {name: comparison.errors(run) for name, run in measured.items()}
+    own = comparison.coarser
     content = {
         "scene": _scene(comparison),
         "environment": dict(comparison.environment),
         "reference": comparison.reference.name,
-        "models": {name: _row(comparison, run) for name, run in comparison.runs.items()},
-        "reference_uncertainty": errors[coarser.name] if known and coarser else {},
+        "models": {name: _row(comparison, run) for name, run in runs.items()},
+        "reference_uncertainty": errors[own.name] if own else {},
         "errors": errors,
         "agreement_horizon_s": {
-            name: {f"{tolerance:g}": comparison.horizon(run, tolerance) for tolerance in outputs.tolerances}
-            for name, run in comparison.measured.items()
+            name: {
+                f"{tolerance:g}": comparison.horizon(run, tolerance)
+                for tolerance in bench.scene.file.outputs.tolerances
+            }
+            for name, run in measured.items()
         },
-        "contact_intervals": {
-            name: {contact: given.tolist() for contact, given in run.contact_intervals.items()}
-            for name, run in comparison.runs.items()
-        },
-        "ledger": {name: dict(run.ledger) for name, run in comparison.runs.items()},
-        "stiff_stops": comparison.stiff.values(comparison.bench, comparison.rigid) if comparison.stiff else {},
+        "contact_intervals": {name: _lists(run.contact_intervals) for name, run in runs.items()},
+        "ledger": {name: dict(run.ledger) for name, run in runs.items()},
+        "stiff_stops": comparison.stiff.values(bench, comparison.rigid) if comparison.stiff else {},
     }
-    if comparison.bench.mechanics.frictions:
-        content["stick_intervals"] = {
-            name: {friction: given.tolist() for friction, given in run.stick_intervals.items()}
-            for name, run in comparison.runs.items()
-        }
-    return _without_nan(content)
+    if bench.mechanics.frictions:
+        content["stick_intervals"] = {name: _lists(run.stick_intervals) for name, run in runs.items()}
+    return dict(plain(content, "summary"))
 
 
 def histories(comparison: Comparison) -> dict[str, np.ndarray]:
@@ -200,77 +195,54 @@ def histories(comparison: Comparison) -> dict[str, np.ndarray]:
     arrays = {"time": comparison.bench.time}
     for name, run in comparison.runs.items():
         if run.ok:
-            arrays |= {f"{name}/point/{point}": values for point, values in run.points.items()}
-            arrays |= {f"{name}/gap/{contact}": values for contact, values in run.gaps.items()}
-            arrays |= {f"{name}/force/{contact}": values for contact, values in run.contact_force.items()}
-            arrays |= {f"{name}/friction/{friction}": values for friction, values in run.friction_force.items()}
-            arrays |= {f"{name}/slip/{friction}": values for friction, values in run.slip.items()}
+            kinds = {"point": run.points, "gap": run.gaps, "force": run.contact_force}
+            kinds |= {"friction": run.friction_force, "slip": run.slip}
+            arrays |= {f"{name}/{kind}/{of}": values for kind, each in kinds.items() for of, values in each.items()}
             arrays |= {f"{name}/energy_time": run.energy_time, f"{name}/energy": run.energy}
     return arrays
 
 
+def _lists(intervals: Mapping[str, np.ndarray]) -> dict[str, list[list[float]]]:
+    return {name: given.tolist() for name, given in intervals.items()}
+
+
 def _scene(comparison: Comparison) -> dict[str, Any]:
-    scene = comparison.bench.scene
+    bench, file = comparison.bench, comparison.bench.scene.file
     return {
-        "name": scene.name,
-        "title": scene.file.title,
-        "t_end": comparison.bench.t_end,
-        "points": list(comparison.bench.points),
-        "judged_points": list(comparison.bench.judged_points),
-        "start": None if scene.file.start is None else scene.file.start.model_dump(),
-        "loads": [load.model_dump(exclude_none=True) for load in scene.file.loads],
+        "name": bench.scene.name,
+        "title": file.title,
+        "t_end": bench.t_end,
+        "points": bench.points,
+        "judged_points": bench.judged_points,
+        "start": None if file.start is None else file.start.model_dump(),
+        "loads": [load.model_dump(exclude_none=True) for load in file.loads],
         "contacts": {
-            contact.name: {
-                "gap": contact.gap,
-                "stiffness": "rigid" if contact.rigid else contact.stiffness,
-                "damping": contact.damping,
-            }
-            for contact in comparison.bench.mechanics.contacts
+            contact.name: {"gap": contact.gap, "stiffness": _stiffness(contact.stiffness), "damping": contact.damping}
+            for contact in bench.mechanics.contacts
         },
-        "force_laws": [law.model_dump(exclude_none=True) for law in scene.file.force_laws],
+        "force_laws": [law.model_dump(exclude_none=True) for law in file.force_laws],
         "friction": [
-            friction.model_dump(exclude_none=True) | ({"stiffness": "rigid"} if math.isinf(friction.stiffness) else {})
-            for friction in scene.file.friction
+            friction.model_dump(exclude_none=True) | {"stiffness": _stiffness(friction.stiffness)}
+            for friction in file.friction
         ],
-        "assumptions": list(comparison.bench.mechanics.assumptions),
+        "assumptions": bench.mechanics.assumptions,
     }
+
+
+def _stiffness(value: float) -> float | str:
+    """As a scene's file has it."""
+    return "rigid" if math.isinf(value) else value
 
 
 def _row(comparison: Comparison, run: ModelRun) -> dict[str, Any]:
+    names = ("kind", "label", "dofs", "status", "message", "steps", "offline_s", "online_s", "first_s", "repeats_s")
+    intervals = run.contact_intervals
     return {
-        "kind": run.kind,
-        "label": run.label,
-        "dofs": run.dofs,
-        "status": run.status,
-        "message": run.message,
-        "steps": run.steps,
-        "offline_s": run.offline_s,
-        "online_s": run.online_s,
-        "first_s": run.first_s,
-        "repeats_s": list(run.repeats_s),
-        "sampling_s": run.sampling_s,
+        **{name: getattr(run, name) for name in (*names, "sampling_s")},
         "speedup": comparison.speedup(run),
-        "first_contact_s": {name: metrics.first_contact(given) for name, given in run.contact_intervals.items()},
-        "inner_lift_offs_m": {name: comparison.lift_offs(run, name) for name in run.contact_intervals},
-        "impulse_Ns": dict(run.impulse),
-        "warnings": list(run.warnings),
-        "horizon_s": dict(run.horizon_s),
+        "first_contact_s": {name: metrics.first_contact(given) for name, given in intervals.items()},
+        "inner_lift_offs_m": {name: comparison.lift_offs(run, name) for name in intervals},
+        "impulse_Ns": run.impulse,
+        "warnings": run.warnings,
+        "horizon_s": run.horizon_s,
     }
-
-
-def _errors(comparison: Comparison, run: ModelRun) -> dict[str, dict[str, float]]:
-    return {
-        f"{until:g}": {point: comparison.error(run, point, until) for point in comparison.bench.points}
-        for until in comparison.bench.windows
-    }
-
-
-def _without_nan(value: Any) -> Any:
-    """The same with None for numbers JSON cannot hold."""
-    if isinstance(value, Mapping):
-        return {key: _without_nan(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_without_nan(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return float(value) if isinstance(value, np.floating) else value

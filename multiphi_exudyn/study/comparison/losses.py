@@ -6,85 +6,66 @@ so they are given as a table over both parameters, and for rigid and compliant l
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.study.measures import metrics
+from multiphi_exudyn.study.running.runs import interval_array
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart
 from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.warning_groups import kept_back
 
-__all__ = ["LossTable", "loss_tables"]
+__all__ = ["loss_tables"]
 
 MODES = (4, 6, 8, 12, 24)
 FACTORS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0)  # of the scene's own start
 
 
-@dataclass(frozen=True)
-class LossTable:
-    """counts: modes -> losses of contact inside the first phase, per start; None where a run failed.
+def loss_tables(bench: Workbench) -> dict[str, pd.DataFrame]:
+    """Kind of levels -> losses of contact inside the first phase by modes and start, "failed" where a run did.
 
-    starts: how the starts are written, all of them the scene's own times a factor.
+    Of a scene with one contact; none where there is nothing to count, nor under loads, with force laws or friction:
+    the tables are of a start that is scaled.
     """
-
-    contact: str
-    levels: str
-    starts: tuple[str, ...]
-    counts: Mapping[int, tuple[int | None, ...]]
-
-
-def loss_tables(bench: Workbench) -> tuple[LossTable, ...]:
-    """One table per kind of level, of a scene with one contact; none where there is nothing to count.
-
-    Nor under loads, with force laws or friction: the tables are of a start that is scaled.
-    """
-    if (
-        bench.scene.file.loads
-        or bench.mechanics.force_laws
-        or bench.mechanics.frictions
-        or not (len(bench.mechanics.contacts) == 1 and np.isfinite(bench.longest_period))
-        or _starts_closed(bench)
-    ):
-        return ()
-    modes = [r for r in MODES if r <= bench.structure.n - len(bench.mechanics.contacts)]
-    rigid = {bench.mechanics.contacts[0].rigid, True}
-    return tuple(_table(bench, modes, kind) for kind in sorted(rigid) if modes)
+    mechanics = bench.mechanics
+    if bench.scene.file.loads or mechanics.force_laws or mechanics.frictions or len(mechanics.contacts) != 1:
+        return {}
+    (contact,) = mechanics.contacts
+    modes = [r for r in MODES if r <= bench.structure.n - 1]
+    start = start_configuration(bench, MultiPhiModel(bench.structure, [contact], modes=1))
+    starts_closed = contact.gap + bench.structure.row(contact.direction) @ start <= 0
+    if starts_closed or not modes or not np.isfinite(bench.longest_period):
+        return {}
+    kinds = {"rigid": True} if contact.rigid else {"compliant": False, "rigid": True}
+    return {f"{kind} levels, {contact.name}": _table(bench, modes, rigid) for kind, rigid in kinds.items()}
 
 
-def _starts_closed(bench: Workbench) -> bool:
-    start = start_configuration(bench, MultiPhiModel(bench.structure, bench.mechanics.contacts, modes=1))
-    gaps = [contact.gap + bench.structure.row(contact.direction) @ start for contact in bench.mechanics.contacts]
-    return min(gaps) <= 0
-
-
-def _table(bench: Workbench, modes: Sequence[int], rigid: bool) -> LossTable:
-    contacts = bench.contacts(rigid)
-    model = MultiPhiModel(bench.structure, contacts, modes=modes[0])
+def _table(bench: Workbench, modes: list[int], rigid: bool) -> pd.DataFrame:
+    model = MultiPhiModel(bench.structure, bench.contacts(rigid), modes=modes[0])
     start = start_configuration(bench, model)
-    counts = {r: _counts(bench, replace(model, modes=r), start) for r in modes}
-    return LossTable(contacts[0].name, "rigid" if rigid else "compliant", _starts(bench), counts)
+    models = {f"r = {r}": replace(model, modes=r) for r in modes}
+    counted = {
+        _start_words(bench, factor): {name: _losses(bench, each, factor * start) for name, each in models.items()}
+        for factor in FACTORS
+    }
+    return pd.DataFrame(counted, dtype=object)
 
 
-def _starts(bench: Workbench) -> tuple[str, ...]:
+def _start_words(bench: Workbench, factor: float) -> str:
     start = bench.scene.file.start
     if isinstance(start, DisplacedStart):
-        return tuple(f"{1e3 * factor * start.displacement:+g} mm" for factor in FACTORS)
+        return f"{1e3 * factor * start.displacement:+g} mm"
     assert start is not None, "a scene without loads has a start"
-    return tuple(f"{factor * start.force:+g} N" for factor in FACTORS)
+    return f"{factor * start.force:+g} N"
 
 
-def _counts(bench: Workbench, model: MultiPhiModel, start: np.ndarray) -> tuple[int | None, ...]:
-    """The start is scaled as a whole, which is exact for a start off the contacts."""
-    end = min(bench.t_end, bench.longest_period)
-    counts: list[int | None] = []
-    for factor in FACTORS:
-        with kept_back():
-            trajectory = simulate(model, end, displacement=factor * start)
-        intervals = np.array(trajectory.contact_intervals(model.contacts[0].name)).reshape(-1, 2)
-        ok = trajectory.status == "ok"
-        counts.append(metrics.inner_losses(intervals, bench.longest_period) if ok else None)
-    return tuple(counts)
+def _losses(bench: Workbench, model: MultiPhiModel, start: np.ndarray) -> int | str:
+    """From a start that is scaled as a whole, which is exact for one off the contacts."""
+    with kept_back():
+        run = simulate(model, min(bench.t_end, bench.longest_period), displacement=start)
+    intervals = interval_array(run.contact_intervals(model.contacts[0].name))
+    return metrics.inner_losses(intervals, bench.longest_period) if run.status == "ok" else "failed"

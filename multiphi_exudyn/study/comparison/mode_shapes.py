@@ -1,4 +1,4 @@
-"""Mode shapes and frequencies of the levels a run was in, for drawing; of the rig beside the published tables."""
+"""Mode shapes and frequencies of the levels a run was in, and their picture; of the rig beside the published tables."""
 
 from __future__ import annotations
 
@@ -6,24 +6,28 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.study.comparison.beam_places import beam_places, coefficients
 from multiphi_exudyn.study.comparison.compare import Comparison
-from multiphi_exudyn.study.comparison.placement import Placement, meeting, placements
+from multiphi_exudyn.study.comparison.figure_style import COLOURS, LINE, STYLE, WIDTH
 from multiphi_exudyn.study.measures.metrics import held_levels
 from multiphi_exudyn.study.scene.discretised import LinearBeams
 from multiphi_exudyn.study.scene.workbench import ELEMENTS
 from reference_models.beams import NAMELESS, Beams
 from reference_models.rig import PublishedLevel, published_frequencies
 
-__all__ = ["BeamShapes", "LevelModes", "level_modes"]
+__all__ = ["BeamShapes", "LevelModes", "level_modes", "mode_figure"]
 
 SHOWN = 4  # modes, as many as the paper's tables list
 STATIONS = 101  # places along a beam
 MOST_LEVELS = 4  # the open one, and those held longest
 LISTED = 3  # closed contacts that a level's name lists
+APART = 2.3  # between beams drawn over each other, of the largest value of a mode
 
 
 @dataclass(frozen=True)
@@ -63,82 +67,91 @@ class LevelModes:
 
 def level_modes(comparison: Comparison) -> tuple[LevelModes, ...]:
     """The open level, a lone contact's closed one, and those the reference held longest; none for matrices."""
-    bench = comparison.bench
-    if bench.mechanics.beams is None:
+    bench, beams = comparison.bench, comparison.bench.mechanics.beams
+    if beams is None:
         return ()
     contacts = bench.contacts(rigid=bench.mechanics.parameter_set is not None)
-    names = tuple(contact.name for contact in contacts)
-    shares = _shares(comparison)
-    longest = sorted(shares, key=lambda closed: -shares[closed])
-    wanted = list(dict.fromkeys([(), *([names] if len(names) == 1 else []), *longest]))[:MOST_LEVELS]
-    drawn = _Drawn.of(bench.mechanics.beams, contacts)
+    held = held_levels(comparison.reference.contact_intervals, bench.t_end) if comparison.reference.ok else {}
+    longest = sorted(held, key=lambda closed: -held[closed])
+    alone = [(contacts[0].name,)] if len(contacts) == 1 else []
+    model, (stations, rows) = MultiPhiModel(bench.structure, contacts, modes=SHOWN), _stations(beams)
+    drawn = MultiPhiModel(stations.structure, contacts, modes=SHOWN)
     published = published_frequencies().values() if bench.mechanics.parameter_set else ()
     return tuple(
         LevelModes(
             closed=closed,
-            share=shares.get(closed, 0.0) if shares else None,
-            frequencies=MultiPhiModel(bench.structure, contacts, modes=SHOWN).level(closed).frequencies[:SHOWN],
-            beams=drawn.shapes(closed),
+            share=held.get(closed, 0.0) / bench.t_end if held else None,
+            frequencies=model.level(closed).frequencies[:SHOWN],
+            beams=_shapes(beams, contacts, closed, rows @ drawn.level(closed).shapes[:, :SHOWN]),
             published=tuple(column for column in published if column.level == closed),
         )
-        for closed in wanted
+        for closed in list(dict.fromkeys([(), *alone, *longest]))[:MOST_LEVELS]
     )
 
 
-def _shares(comparison: Comparison) -> dict[tuple[str, ...], float]:
-    """Closed contacts -> share of the reference's run; empty where it failed."""
-    if not comparison.reference.ok:
-        return {}
-    end = comparison.bench.t_end
-    return {closed: held / end for closed, held in held_levels(comparison.reference.contact_intervals, end).items()}
+@rc_context(STYLE)
+def mode_figure(levels: Sequence[LevelModes]) -> Figure:
+    """The lowest mode shapes of every level: its beams, from top to bottom, along x."""
+    figure = Figure(figsize=(WIDTH, (1.2 + 0.9 * len(levels[0].beams)) * len(levels) + 0.3))
+    for part, level in zip(figure.subfigures(len(levels), 1, squeeze=False)[:, 0], levels, strict=True):
+        held = "" if level.share is None else f": {100 * level.share:.3g} % of the reference's run"
+        part.suptitle(level.name + held, x=0.01, ha="left", fontsize=10)
+        row = part.subplots(1, len(level.frequencies), sharex=True, sharey=True, squeeze=False)[0]
+        for mode, axes in enumerate(row):
+            _draw_mode(axes, level, mode)
+        names = [beam.name for beam in level.beams] if len(level.beams) > 1 else []
+        row[0].set_yticks(-APART * np.arange(len(names)), names, fontsize=9)
+    return figure
 
 
-@dataclass(frozen=True)
-class _Drawn:
-    """Beams as linear elements whose deflection is known at stations: name -> x (k,) [m] and rows (k, n)."""
+def _stations(beams: Beams) -> tuple[LinearBeams, np.ndarray]:
+    """The beams as linear elements with points at their stations, and the rows (beams, stations, n) of these."""
+    parts = {
+        name: replace(beam, points=dict(beam.points) | {f"{i}": x for i, x in enumerate(_along(beams, name).tolist())})
+        for name, beam in beams.parts.items()
+    }
+    linear = LinearBeams(replace(beams, parts=parts), ELEMENTS)
+    prefixes = ["" if name == NAMELESS else f"{name}." for name in parts]
+    rows = [[linear.structure.row(f"{prefix}{i}") for i in range(STATIONS)] for prefix in prefixes]
+    return linear, np.array(rows)
 
-    beams: Beams
-    contacts: Sequence[UnilateralContact]
-    model: MultiPhiModel
-    stations: Mapping[str, tuple[np.ndarray, np.ndarray]]
-    places: Mapping[str, Placement]
 
-    @classmethod
-    def of(cls, beams: Beams, contacts: Sequence[UnilateralContact]) -> _Drawn:
-        """The beams with points at their stations."""
-        x = {name: np.linspace(beam.start, beam.end, STATIONS) for name, beam in beams.parts.items()}
-        parts = {
-            name: replace(beam, points=dict(beam.points) | {f"{i}": float(place) for i, place in enumerate(x[name])})
-            for name, beam in beams.parts.items()
-        }
-        structure = LinearBeams(replace(beams, parts=parts), ELEMENTS).structure
-        stations = {name: (along, _rows(structure, name)) for name, along in x.items()}
-        model = MultiPhiModel(structure, contacts, modes=SHOWN)
-        return cls(beams, contacts, model, stations, placements(beams, contacts))
+def _along(beams: Beams, name: str) -> np.ndarray:
+    return np.linspace(beams.parts[name].start, beams.parts[name].end, STATIONS)
 
-    def shapes(self, closed: tuple[str, ...]) -> tuple[BeamShapes, ...]:
-        """Every beam in the modes of a level, the largest value of each mode 1, the tip that moves most above zero."""
-        modes = self.model.level(closed).shapes[:, :SHOWN]
-        of = {name: rows @ modes for name, (_, rows) in self.stations.items()}
-        tips = np.array([values[-1] for values in of.values()])
-        most = np.take_along_axis(tips, np.argmax(np.abs(tips), axis=0)[None], axis=0)[0]
-        scale = np.where(most < 0, -1.0, 1.0) / np.max(
-            [np.max(np.abs(values), axis=0) for values in of.values()], axis=0
+
+def _shapes(
+    beams: Beams, contacts: Sequence[UnilateralContact], closed: Sequence[str], deflections: np.ndarray
+) -> tuple[BeamShapes, ...]:
+    """Every beam in the modes of a level, the largest value of each mode 1, the tip that moves most above zero.
+
+    deflections: (beams, stations, m), beams in the scene's order.
+    """
+    tips = deflections[:, -1]
+    most = np.take_along_axis(tips, np.argmax(np.abs(tips), axis=0)[None], axis=0)[0]
+    scaled = deflections * np.where(most < 0, -1.0, 1.0) / np.max(np.abs(deflections), axis=(0, 1))
+    of: Mapping[str, np.ndarray] = dict(zip(beams.parts, scaled, strict=True))
+    met = [beams.points[point] for c in contacts if c.name in closed for point in coefficients(c)]
+    return tuple(
+        BeamShapes(
+            name=name,
+            x=_along(beams, name) + shift,
+            shapes=of[name].T,
+            masses=tuple(mass.at + shift for mass in beams.parts[name].masses),
+            contacts=tuple(x + shift for beam, x in met if beam == name),
         )
-        struck = [self.beams.points[point] for c in self.contacts if c.name in closed for point in meeting(c)]
-        return tuple(
-            BeamShapes(
-                name=name,
-                x=self.stations[name][0] + place.shift,
-                shapes=(of[name] * scale).T,
-                masses=tuple(mass.at + place.shift for mass in self.beams.parts[name].masses),
-                contacts=tuple(x + place.shift for beam, x in struck if beam == name),
-            )
-            for name, place in sorted(self.places.items(), key=lambda item: (item[1].group, -item[1].height))
-        )
+        for name, shift in beam_places(beams, contacts).items()
+    )
 
 
-def _rows(structure: LinearStructure, beam: str) -> np.ndarray:
-    """Rows (k, n) that give the deflections of a beam at its stations."""
-    names = (f"{i}" if beam == NAMELESS else f"{beam}.{i}" for i in range(STATIONS))
-    return np.array([structure.row(name) for name in names])
+def _draw_mode(axes: Axes, level: LevelModes, mode: int) -> None:
+    for number, beam in enumerate(level.beams):
+        zero, shape = -APART * number, beam.shapes[mode]
+        axes.plot(beam.x[[0, -1]], [zero, zero], color=LINE, lw=0.8)
+        axes.plot(beam.x, zero + shape, color=COLOURS[0], lw=1.6)
+        for places, marker, colour in ((beam.masses, "s", "#000000"), (beam.contacts, "^", "#D55E00")):
+            axes.plot(places, zero + np.interp(places, beam.x, shape), marker, color=colour, ms=6)
+    axes.set_title(f"mode {mode + 1}, {level.frequencies[mode]:.2f} Hz", fontsize=9)
+    axes.tick_params(axis="y", length=0)
+    axes.set_xlabel("x [m]", fontsize=9)
+    axes.grid(visible=False)

@@ -4,16 +4,33 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
+import pandas as pd
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
+from multiphi_exudyn.study.comparison.figure_style import data_uri
 from multiphi_exudyn.study.comparison.wording import engineering, listed, percent, seconds, sentence, share, times
 
-__all__ = ["embedded", "environment_of", "sentences"]
+__all__ = ["Picture", "embedded", "environment_of", "sentences"]
 
 SHARED = "multiphi_exudyn.study.comparison"  # its templates are those of every page
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure as a data URI, with its caption."""
+
+    source: str
+    caption: str
+
+    @classmethod
+    def of(cls, figure: Figure, caption: str) -> Picture:
+        """A figure, drawn."""
+        return cls(data_uri(figure), caption)
 
 
 def embedded(data: Any) -> Markup:
@@ -21,7 +38,12 @@ def embedded(data: Any) -> Markup:
     return Markup(json.dumps(data).replace("<", "\\u003c"))
 
 
-FILTERS = (embedded, engineering, listed, percent, seconds, sentence, share, times)
+def html(frame: pd.DataFrame) -> Markup:
+    """A table as a page has it, what it is of in its upper left corner (the name of its columns)."""
+    return Markup(frame.to_html(border=0, index_names=frame.columns.name is not None))
+
+
+FILTERS = (embedded, engineering, html, listed, percent, seconds, sentence, share, times)
 
 
 def environment_of(package: str) -> Environment:

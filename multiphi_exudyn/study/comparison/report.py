@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 
-from matplotlib.figure import Figure
+import pandas as pd
 
-from multiphi_exudyn.study.comparison import contact_plots, plots
-from multiphi_exudyn.study.comparison.compare import Comparison
-from multiphi_exudyn.study.comparison.contact_totals import LISTED, ContactTotals, contact_totals
-from multiphi_exudyn.study.comparison.energy_plot import energy_figure
+from multiphi_exudyn.study.comparison import plots
+from multiphi_exudyn.study.comparison.compare import LISTED, Comparison
 from multiphi_exudyn.study.comparison.findings import findings
-from multiphi_exudyn.study.comparison.losses import LossTable
-from multiphi_exudyn.study.comparison.mode_plots import mode_figure
-from multiphi_exudyn.study.comparison.mode_shapes import LevelModes
-from multiphi_exudyn.study.comparison.pages import environment_of
+from multiphi_exudyn.study.comparison.mode_shapes import LevelModes, mode_figure
+from multiphi_exudyn.study.comparison.pages import Picture, environment_of
+from multiphi_exudyn.study.comparison.wording import percent, seconds, share
 from multiphi_exudyn.study.comparison.zoom import histories_to_zoom
 from multiphi_exudyn.study.measures import metrics
+from multiphi_exudyn.study.measures.stiff_stops import StiffStops
+from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF
 from reference_models.rig import rig
 
-__all__ = ["render"]
+__all__ = ["contact_totals", "render"]
 
 TEMPLATE = "report.html.j2"
 ON_THE_PAGE = (
@@ -39,88 +38,117 @@ HISTORY = (
     "{}: the whole run, {}and the largest difference to the reference up to each time. "
     "In the grey area a difference is no larger than the reference's to its own coarser copy."
 )
+COST = "Lower left is better. In the grey band a model is as good as the reference can tell. {}"
+HOLLOW = "Hollow: rigid levels against stiff stops. "
+CONTACT = "A bar is a time span in contact."
 MANY = "A bar is a time span in contact; contacts are numbered in the order of the scene."
 FRICTION = "The force against the motion, and how far the patch has slipped on its counter-surface."
+ENERGY = "Where a bar ends below 100 %, time integration has lost energy; above, it has gained energy."
 MODES = "Square: point mass. Triangle: closed contact, {}. All modes are scaled to the same largest value."
 RIGID, COMPLIANT = "rigid, as in the published tables", "a spring of the scene's stiffness, so the point there moves"
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A figure as a data URI, with its place in the page and its caption."""
-
-    section: str
-    source: str
-    caption: str
-
-
-def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Sequence[LossTable]) -> str:
+def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Mapping[str, pd.DataFrame]) -> str:
     """The page as HTML."""
-    environment, end = environment_of(__package__ or ""), ROUND_OFF * comparison.bench.t_end
-    environment.filters["until"] = lambda given: "whole run" if given >= end else f"{given:.3f} s"
-    return environment.get_template(TEMPLATE).render(
-        comparison=comparison,
-        bench=comparison.bench,
-        scene=comparison.bench.scene,
-        findings=findings(comparison),
-        levels=levels,
-        losses=losses,
-        metrics=metrics,
-        definitions=[metrics.METRICS[name] for name in ON_THE_PAGE],
-        pictures=list(_pictures(comparison, levels)),
-        totals=_totals(comparison),
-        zoom=histories_to_zoom(comparison),
-        contradiction=rig().contradiction if comparison.bench.mechanics.parameter_set else "",
+    bench = comparison.bench
+    contradiction = rig().contradiction if bench.mechanics.parameter_set else ""
+    pictures = defaultdict[str, list[Picture]](list)
+    for section, picture in _pictures(comparison, levels):
+        pictures[section].append(picture)
+    return (
+        environment_of(__package__ or "")
+        .get_template(TEMPLATE)
+        .render(
+            name=bench.scene.name,
+            title=bench.scene.file.title,
+            findings=findings(comparison),
+            definitions=[metrics.METRICS[name] for name in ON_THE_PAGE],
+            assumptions=[each for each in bench.mechanics.assumptions if each != contradiction],
+            environment=comparison.environment,
+            comparison=comparison,
+            bench=bench,
+            scene=bench.scene,
+            levels=levels,
+            losses=losses,
+            metrics=metrics,
+            errors=_errors(comparison),
+            stiff_errors=_stiff_errors(comparison, comparison.stiff) if comparison.stiff and comparison.rigid else None,
+            pictures=pictures,
+            totals=contact_totals(comparison) if len(bench.mechanics.contacts) > LISTED else None,
+            zoom=histories_to_zoom(comparison),
+            contradiction=contradiction,
+        )
     )
 
 
-def _totals(comparison: Comparison) -> dict[str, ContactTotals]:
-    """Of every model that ran, where the contacts are too many to be told of one by one."""
-    if len(comparison.bench.mechanics.contacts) <= LISTED:
-        return {}
-    end = comparison.bench.t_end
-    return {name: contact_totals(run, end) for name, run in comparison.runs.items() if run.ok}
+def contact_totals(comparison: Comparison) -> pd.DataFrame:
+    """What the contacts of each model that ran did together."""
+    return pd.DataFrame(
+        {name: _totals(run, comparison.bench.t_end) for name, run in comparison.runs.items() if run.ok}
+    ).T
 
 
-def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterable[Picture]:
-    if comparison.reference.ok:
-        detail = "the first contact phase, " if comparison.reference.contact_intervals else ""
+def _totals(run: ModelRun, t_end: float) -> dict[str, object]:
+    counts = [len(given) for given in run.contact_intervals.values()]
+    held = metrics.held_levels(run.contact_intervals, t_end)
+    together = metrics.union(run.contact_intervals.values())
+    first = metrics.first_contact(together)
+    return {
+        "contacts touched": sum(count > 0 for count in counts),
+        "contacts made": sum(counts),
+        "most at once": max(map(len, held)),
+        "sets of closed contacts": len(held),
+        "first contact": "–" if first is None else f"{1e3 * first:.3f} ms",
+        "time with any contact": seconds(metrics.closed_time(together)),
+        "impulse of all": f"{sum(run.impulse.values()):.4g} N s" if run.impulse else "–",
+    }
+
+
+def _errors(comparison: Comparison) -> pd.DataFrame:
+    """Errors by window and point, and until when runs agree with the reference and with themselves, nudged."""
+    end, tolerances = comparison.bench.t_end, comparison.bench.scene.file.outputs.tolerances
+
+    def until(given: float | None) -> str:
+        return "–" if given is None else "whole run" if given >= ROUND_OFF * end else f"{given:.3f} s"
+
+    lines = {}
+    for name, run in comparison.measured.items():
+        agreement = {("agreement horizon", share(each)): until(comparison.horizon(run, each)) for each in tolerances}
+        nudged = {each: until(run.horizon_s.get(each)) for each in comparison.nudged}
+        own = {("sensitivity horizon", share(float(each))): told for each, told in nudged.items()}
+        lines[name] = _by_window(comparison.errors(run)) | agreement | own
+    return pd.DataFrame(lines).T
+
+
+def _stiff_errors(comparison: Comparison, stiff: StiffStops) -> pd.DataFrame:
+    """Of rigid levels against stiff stops, and the stiff stops' own."""
+    values = stiff.values(comparison.bench, comparison.rigid)
+    tables = values["errors"] | {"own uncertainty": values["uncertainty"]}
+    return pd.DataFrame({name: _by_window(table) for name, table in tables.items()}).T
+
+
+def _by_window(table: Mapping[str, Mapping[str, float | None]]) -> dict[tuple[str, str], str]:
+    """In words, as columns."""
+    return {(f"to {end} s", point): percent(error) for end, errors in table.items() for point, error in errors.items()}
+
+
+def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterator[tuple[str, Picture]]:
+    """Each with the section it belongs to."""
+    reference = comparison.reference
+    if reference.ok:
+        detail = "the first contact phase, " if reference.contact_intervals else ""
         for point in comparison.bench.points:
-            yield _picture("histories", plots.history_figure(comparison, point), HISTORY.format(point, detail))
-        yield _picture(
-            "cost",
-            plots.error_time_figure(comparison),
-            "Lower left is better. In the grey band a model is as good as the reference can tell. "
-            f"{'Hollow: rigid levels against stiff stops. ' if comparison.rigid else ''}"
-            "Colours are the same in all pictures.",
-        )
-        yield from _contact_pictures(comparison)
-        yield from _friction_pictures(comparison)
-        yield _picture(
-            "energy",
-            energy_figure(comparison),
-            "Where a bar ends below 100 %, time integration has lost energy; above, it has gained energy.",
-        )
+            yield "histories", Picture.of(plots.history_figure(comparison, point), HISTORY.format(point, detail))
+        cost = COST.format(HOLLOW if comparison.rigid else "")
+        yield "cost", Picture.of(plots.error_time_figure(comparison), cost)
+        if len(reference.contact_intervals) > LISTED:
+            yield "contact", Picture.of(plots.many_contacts_figure(comparison), MANY)
+        else:
+            for contact in reference.contact_intervals:
+                yield "contact", Picture.of(plots.contact_figure(comparison, contact), CONTACT)
+        for friction in reference.friction_force:
+            yield "friction", Picture.of(plots.friction_figure(comparison, friction), FRICTION)
+        yield "energy", Picture.of(plots.energy_figure(comparison), ENERGY)
     if levels:
         rigid = comparison.bench.mechanics.parameter_set is not None
-        yield _picture("modes", mode_figure(levels), MODES.format(RIGID if rigid else COMPLIANT))
-
-
-def _contact_pictures(comparison: Comparison) -> Iterable[Picture]:
-    """One for each of a few contacts, one for all of many."""
-    contacts = comparison.reference.contact_intervals
-    if len(contacts) > LISTED:
-        yield _picture("contact", contact_plots.many_contacts_figure(comparison), MANY)
-        return
-    for contact in contacts:
-        yield _picture("contact", contact_plots.contact_figure(comparison, contact), "A bar is a time span in contact.")
-
-
-def _friction_pictures(comparison: Comparison) -> Iterable[Picture]:
-    """One for each friction."""
-    for name in comparison.reference.friction_force:
-        yield _picture("friction", contact_plots.friction_figure(comparison, name), FRICTION)
-
-
-def _picture(section: str, figure: Figure, caption: str) -> Picture:
-    return Picture(section, plots.data_uri(figure), caption)
+        yield "modes", Picture.of(mode_figure(levels), MODES.format(RIGID if rigid else COMPLIANT))

@@ -7,16 +7,16 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from multiphi_exudyn.study.comparison.compare import Comparison
-from multiphi_exudyn.study.comparison.contact_totals import LISTED
+from multiphi_exudyn.study.comparison.compare import LISTED, Comparison
 from multiphi_exudyn.study.comparison.plots import first_contact_span, pictured, styles
 from multiphi_exudyn.study.measures.metrics import union
 from multiphi_exudyn.study.running.runs import ModelRun
 
 __all__ = ["histories_to_zoom", "zoom_line", "zoom_plot"]
 
-DASHES = {"-": [], ":": [2, 3], "--": [6, 4]}  # pixels
+DASHES: dict[str, list[int]] = {"-": [], ":": [2, 3]}  # pixels
 
 
 def histories_to_zoom(comparison: Comparison) -> list[dict[str, Any]]:
@@ -40,9 +40,7 @@ def zoom_plot(label: str, x: dict[str, Any], lines: Sequence[dict[str, Any]], **
     } | more
 
 
-def zoom_line(
-    name: str, colour: str, values: Sequence[float] | np.ndarray, x: Sequence[float] | None = None, **more: Any
-) -> dict[str, Any]:
+def zoom_line(name: str, colour: str, values: ArrayLike, x: ArrayLike | None = None, **more: Any) -> dict[str, Any]:
     """A line, on an x of its own or on the plot's grid.
 
     more: width (0: none), dash, mark [pixels], faint, and notes: what each point is, told where the mouse is.
@@ -51,23 +49,23 @@ def zoom_line(
     return given | {"width": 0, "dash": [], "mark": 0, "faint": False, "notes": None} | more
 
 
-def _encoded(values: Sequence[float] | np.ndarray) -> str:
+def _encoded(values: ArrayLike) -> str:
     return base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
 
 
 def _plots(comparison: Comparison) -> Iterator[dict[str, Any]]:
     runs, time = [comparison.reference, *pictured(comparison)], comparison.bench.time
     x = {"label": "time [s]", "group": "time", "log": False, "start": time[0], "step": time[1] - time[0]}
-    shade, detail = union(comparison.reference.contact_intervals.values()).tolist(), first_contact_span(comparison)
+    contacts = comparison.reference.contact_intervals
+    shade, detail = union(contacts.values()).tolist(), list(first_contact_span(comparison))
     for point in comparison.bench.points:
         lines = [_line(comparison, run, 1e3 * run.points[point]) for run in runs]
-        yield zoom_plot(f"{point} [mm]", x, lines, shade=shade, detail=list(detail))
-    contacts = comparison.reference.contact_intervals
-    for contact in contacts if len(contacts) <= LISTED else ():
+        yield zoom_plot(f"{point} [mm]", x, lines, shade=shade, detail=detail)
+    for contact, intervals in contacts.items() if len(contacts) <= LISTED else ():
         lines = [_line(comparison, run, run.contact_force[contact]) for run in runs]
-        yield zoom_plot(f"force of {contact} [N]", x, lines, shade=contacts[contact].tolist(), detail=list(detail))
+        yield zoom_plot(f"force of {contact} [N]", x, lines, shade=intervals.tolist(), detail=detail)
 
 
 def _line(comparison: Comparison, run: ModelRun, values: np.ndarray) -> dict[str, Any]:
     style = styles(comparison)[run.name]
-    return zoom_line(run.name, style.colour, values, width=style.width, dash=DASHES.get(str(style.line), []))
+    return zoom_line(run.name, style.colour, values, width=style.width, dash=DASHES[str(style.line)])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -34,11 +33,11 @@ def measures(bench: Workbench, run: ModelRun, reference: ModelRun | None) -> dic
         "dofs": run.dofs,
         "steps": run.steps,
         **_differences(bench, run, reference),
-        "largest": {name: _number(np.max(np.abs(values))) for name, values in run.points.items()},
+        "largest": {name: metrics.number(np.max(np.abs(values))) for name, values in run.points.items()},
         **_contacts(bench, run),
-        "energy_end": _number(run.energy[-1]) if len(run.energy) else None,
-        "ledger": {row: _number(value) for row, value in run.ledger.items()},
-        "horizon_s": {tolerance: _number(end) for tolerance, end in run.horizon_s.items()},
+        "energy_end": metrics.number(run.energy[-1]) if len(run.energy) else None,
+        "ledger": {row: metrics.number(value) for row, value in run.ledger.items()},
+        "horizon_s": {tolerance: metrics.number(end) for tolerance, end in run.horizon_s.items()},
         "warnings": list(run.warnings),
     }
 
@@ -56,20 +55,15 @@ def horizons(bench: Workbench, run: ModelRun, reference: ModelRun) -> dict[str, 
 def _differences(bench: Workbench, run: ModelRun, reference: ModelRun | None) -> dict[str, Any]:
     if reference is None or not (run.ok and reference.ok):
         return {name: {} for name in (*DIFFERENCES, "horizon")}
-    tables = {name: _by_window(bench, run, reference, measure) for name, measure in DIFFERENCES.items()}
+
+    def table(difference: Difference) -> dict[str, dict[str, float | None]]:
+        def measure(point: str, until: float) -> float:
+            return difference(run.points[point], reference.points[point], run.time, until)
+
+        return metrics.by_window(bench.windows, bench.points, measure)
+
+    tables = {name: table(difference) for name, difference in DIFFERENCES.items()}
     return {**tables, "horizon": horizons(bench, run, reference)}
-
-
-def _by_window(
-    bench: Workbench, run: ModelRun, reference: ModelRun, measure: Difference
-) -> dict[str, dict[str, float | None]]:
-    return {
-        f"{until:g}": {
-            point: _number(measure(run.points[point], reference.points[point], run.time, until))
-            for point in bench.points
-        }
-        for until in bench.windows
-    }
 
 
 def _contacts(bench: Workbench, run: ModelRun) -> dict[str, dict[str, Any]]:
@@ -79,12 +73,7 @@ def _contacts(bench: Workbench, run: ModelRun) -> dict[str, dict[str, Any]]:
         "contact_count": {name: len(times) for name, times in given.items()},
         "closed_time": {name: metrics.closed_time(times) for name, times in given.items()},
         "intervals": {name: times.tolist() for name, times in given.items()},
-        "largest_force": {name: _number(np.max(force)) for name, force in run.contact_force.items()},
-        "impulse": {name: _number(value) for name, value in run.impulse.items()},
+        "largest_force": {name: metrics.number(np.max(force)) for name, force in run.contact_force.items()},
+        "impulse": {name: metrics.number(value) for name, value in run.impulse.items()},
         "inner_losses": {name: metrics.inner_losses(times, bench.longest_period) for name, times in given.items()},
     }
-
-
-def _number(value: float) -> float | None:
-    """None where JSON has no number."""
-    return float(value) if math.isfinite(value) else None

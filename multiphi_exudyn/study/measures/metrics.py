@@ -6,7 +6,7 @@ Histories are values at the times of one common grid, (k,); windows start at 0 a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ __all__ = [
     "METRICS",
     "Metric",
     "agreement_horizon",
+    "by_window",
     "closed_time",
     "first_contact",
     "first_phase",
@@ -22,6 +23,7 @@ __all__ = [
     "inner_losses",
     "max_difference",
     "nrmse",
+    "number",
     "running_nrmse",
     "union",
 ]
@@ -125,6 +127,18 @@ METRICS = {
         "where the initial energy went, row by row; the residual is what the rows leave unaccounted for.",
     ),
 }
+
+
+def number(value: float) -> float | None:
+    """As JSON has it: None where there is no finite number."""
+    return float(value) if math.isfinite(value) else None
+
+
+def by_window(
+    windows: Iterable[float], points: Iterable[str], measure: Callable[[str, float], float]
+) -> dict[str, dict[str, float | None]]:
+    """End of the window [s] -> point -> measure(point, end)."""
+    return {f"{end:g}": {point: number(measure(point, end)) for point in points} for end in windows}
 
 
 def nrmse(values: np.ndarray, reference: np.ndarray, time: np.ndarray, until: float) -> float:

@@ -14,7 +14,6 @@ sensitive to anyway. Large displacements are not in it.
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
@@ -64,21 +63,17 @@ class StiffStops:
     def values(self, bench: Workbench, runs: Mapping[str, ModelRun]) -> dict[str, Any]:
         """What JSON holds of it: by window and point its uncertainty, and the errors of ``runs`` by name."""
 
-        def number(value: float) -> float | None:
-            return value if math.isfinite(value) else None
+        def own(point: str, until: float) -> float:
+            return self.uncertainty(bench.time, (point,), until)
 
-        def by_window(measure: Any) -> dict[str, dict[str, float | None]]:
-            return {
-                f"{until:g}": {point: number(measure((point,), until)) for point in bench.points}
-                for until in bench.windows
-            }
+        def errors(run: ModelRun) -> dict[str, dict[str, float | None]]:
+            return metrics.by_window(bench.windows, bench.points, lambda point, until: self.error(run, (point,), until))
 
-        known = {name: run for name, run in runs.items() if self.ok and run.ok}
         return {
             "stiffness": list(self.stiffness),
             "message": self.message,
-            "uncertainty": by_window(functools.partial(self.uncertainty, bench.time)) if self.ok else {},
-            "errors": {name: by_window(functools.partial(self.error, run)) for name, run in known.items()},
+            "uncertainty": metrics.by_window(bench.windows, bench.points, own) if self.ok else {},
+            "errors": {name: errors(run) for name, run in runs.items() if self.ok and run.ok},
         }
 
 
