@@ -146,7 +146,7 @@ def _coupled(base: ModalBase, one: _Rub, other: _Rub) -> bool:
 def _backwards(segments: Segments) -> Iterator[str]:
     """Of the friction that for the largest part of its slip has a speed against it, seen in the middle of segments.
 
-    Where every exit is armed it has none: most runs need no more than the time that is left.
+    Where every exit is armed it has none: those segments are left out.
     """
     contacts = segments.levels[0].level.base.contacts
     middles, lasting = (segments.starts + segments.ends) / 2, segments.ends - segments.starts
@@ -156,8 +156,9 @@ def _backwards(segments: Segments) -> Iterator[str]:
         slips = np.array([level.states[i] > sticks for level in segments.levels])[segments.numbers]
         if sticks < 0 or np.sum(lasting[slips & ~segments.settled]) <= BACKWARDS * np.sum(lasting[slips]):
             continue
-        speeds = segments.values(middles, "right", functools.partial(_slip_row, i, sticks))
-        against = slips & (speeds < -SEEN * np.max(np.abs(speeds)))
+        places = np.flatnonzero(slips & ~segments.settled)
+        speeds = segments.values(middles[places], "right", functools.partial(_slip_row, i, sticks))
+        against = places[speeds < -SEEN * np.max(np.abs(speeds))]
         share = float(np.sum(lasting[against]) / np.sum(lasting[slips]))
         worst, name = max((worst, name), (share, element.name))
     if worst > BACKWARDS:

@@ -444,7 +444,7 @@ class TestFriction:
     def test_that_begins_along_its_slip_is_not_looked_into(self):
         """Where the speed along a slip is armed it ends the slip before it turns round."""
         model = mp.MultiPhiModel(
-            chain(12, stiffness=40.0), [mp.Friction("belt", "m9", 1.0, 2.0, velocity=0.1)], modes=7
+            chain(12, stiffness=40.0), [mp.Friction("belt", "m9", 1.0, 2.0, velocity=0.1)], modes=11
         )
         run = mp.simulate(model, 60.0)
         assert sum(event.kind == "slip" for event in run.events) > 5
