@@ -20,8 +20,8 @@ import numpy as np
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.level_arrays import LevelArrays
-from multiphi_exudyn.events.loaded_levels import LoadedLevels
+from multiphi_exudyn.events.packing.level_arrays import LevelArrays
+from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 
 LENGTH, ELEMENTS, STOPS, GAP = 1.0, 100, 12, 1e-3  # m, , , m
 MODES, ROUNDS = 12, 20

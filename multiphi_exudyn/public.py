@@ -7,7 +7,7 @@ from multiphi_exudyn.errors import (
     MultiPhiWarning,
     NumericalFailure,
 )
-from multiphi_exudyn.events.state import Event
+from multiphi_exudyn.events.transitions.state import Event
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.level_override import LevelOverride
 from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo
@@ -32,12 +32,12 @@ from multiphi_exudyn.mechanics.time_functions import Harmonic, Smooth, Sweep
 from multiphi_exudyn.steady.frequency_response import FrequencyResponse, frequency_response
 from multiphi_exudyn.steady.settled_state import SteadyState
 from multiphi_exudyn.steady.steady_state import steady_state
-from multiphi_exudyn.time.balance import Ledger
-from multiphi_exudyn.time.many import ManyRuns, simulate_many
-from multiphi_exudyn.time.saved import SavedTrajectory, load_trajectory
+from multiphi_exudyn.time.many.many import ManyRuns, simulate_many
+from multiphi_exudyn.time.reliability.truncation import truncation_indicator
 from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.trajectory import Trajectory
-from multiphi_exudyn.time.truncation import truncation_indicator
+from multiphi_exudyn.time.trajectory.ledger import Ledger
+from multiphi_exudyn.time.trajectory.saved import SavedTrajectory, load_trajectory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from multiphi_exudyn.version import __version__
 
 __all__ = [

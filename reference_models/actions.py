@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
+from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
 from multiphi_exudyn.mechanics.loads import Load, VaryingLoad
 from multiphi_exudyn.mechanics.moving_supports import BaseMotion, StopMotion
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity

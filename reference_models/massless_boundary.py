@@ -24,7 +24,7 @@ from multiphi_exudyn.mechanics.moving_supports import StopMotion
 from multiphi_exudyn.mechanics.structure import At, LinearStructure
 from multiphi_exudyn.mechanics.time_functions import Harmonic
 from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["MasslessBoundary", "massless_boundary"]
 

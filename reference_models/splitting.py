@@ -19,7 +19,7 @@ import numpy as np
 import scipy.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mathematics.compiled import Numbers, compiled, entry
+from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.structure import LinearStructure
 from reference_models.craig_bampton import craig_bampton

@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.events.loaded_level import LoadedLevel
-from multiphi_exudyn.events.state import Phase, State
-from multiphi_exudyn.events.transition import Transition
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.events.transitions.state import Phase, State
+from multiphi_exudyn.events.transitions.transition import Transition
 from multiphi_exudyn.levels.model import MultiPhiModel
 
 __all__ = ["Signal", "SpringRule"]

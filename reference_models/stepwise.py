@@ -18,8 +18,8 @@ import numpy as np
 from scipy.integrate import OdeSolution, solve_ivp
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.events.loaded_level import LoadedLevel
-from multiphi_exudyn.events.state import Phase, State
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.events.transitions.state import Phase, State
 from multiphi_exudyn.levels.model import MultiPhiModel
 from reference_models.spring_rule import Signal, SpringRule
 

@@ -16,12 +16,12 @@ import pytest
 
 from multiphi_exudyn import cli
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiWarning
-from multiphi_exudyn.mathematics import compiled as front
-from multiphi_exudyn.mathematics import compiled_cache
-from multiphi_exudyn.mathematics.compiled import Entry, Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.compiling import compiled as front
+from multiphi_exudyn.mathematics.compiling import compiled_cache
+from multiphi_exudyn.mathematics.compiling.compiled import Entry, Ints, Numbers, Waves, compiled
 
 pytest.importorskip("numba")
-compilation = importlib.import_module("multiphi_exudyn.mathematics.compilation")
+compilation = importlib.import_module("multiphi_exudyn.mathematics.compiling.compilation")
 
 HALF = 0.5
 FIRST, SECOND = 1, 2
@@ -138,7 +138,7 @@ def buffers() -> tuple[np.ndarray, ...]:
 
 
 SOURCE = """
-from multiphi_exudyn.mathematics.compiled import Numbers, compiled, entry
+from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 FACTOR = 2.0
 @compiled
 def scaled(numbers: Numbers, k: int) -> float:
@@ -384,7 +384,7 @@ def test_another_setting_of_the_processor_is_another_file(monkeypatch):
 
 
 def test_numba_that_cannot_be_imported_leaves_the_plain_function_with_a_warning(monkeypatch):
-    monkeypatch.setitem(sys.modules, "multiphi_exudyn.mathematics.compilation", None)
+    monkeypatch.setitem(sys.modules, "multiphi_exudyn.mathematics.compiling.compilation", None)
     with pytest.warns(MultiPhiWarning, match="runs as plain Python"):
         assert program()(ONES) == 6.0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody
-from multiphi_exudyn.mathematics.compiled import available, compile_entries
+from multiphi_exudyn.mathematics.compiling.compiled import available, compile_entries
 from multiphi_exudyn.time.simulate import simulate
 
 __all__ = ["run_compile"]

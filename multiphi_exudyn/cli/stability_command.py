@@ -9,7 +9,7 @@ from tqdm import tqdm
 
 from multiphi_exudyn.cli.options import results_folder
 from multiphi_exudyn.files import write_whole
-from multiphi_exudyn.mathematics.compiled import available, compile_entries
+from multiphi_exudyn.mathematics.compiling.compiled import available, compile_entries
 from multiphi_exudyn.study.running.environment import environment
 from multiphi_exudyn.study.stability.catalogue_run import FULL_LENGTH, QUICK, chosen_cases, run_case
 from multiphi_exudyn.study.stability.report import render_stability, text_table

@@ -6,13 +6,13 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
 
     (38.3)  eta'' of a state              state_arrays.accelerate
     (38.6)  a state in another level      maps.move; its matrices transition.Transition
-    1       armed, and asking             phases.phase_of, waiting.watch, waiting.who_asks, decision.decide_jump
+    1       armed, and asking             phases.phase_of, monitoring.watch, monitoring.who_asks, decision.decide_jump
     2       rigid contacts that strike    striking.impact, impact.collide, striking.close_without_impact
-    2       those at rest after it        resting.list_resting, resting.press, resting.stay_closed, independence.join
+    2       those at rest after it        resting.list_resting, resting.press, resting.stay_closed, redundancy.join
     3       a rigid contact opens         switching.is_firm, switching.open_and_enter, phases.is_pulled, sticking.let_go
     4       a compliant contact changes   switching.try_wishes, switching.switch, phases.is_denied
-    5       recovering                    phases.phase_of, waiting.watch
-    6       refused, and held back        phases.update_phases, phases.hold_back, waiting.watch, waiting.flag_again
+    5       recovering                    phases.phase_of, monitoring.watch
+    6       refused, and held back        phases.update_phases, phases.hold_back, monitoring.watch, monitoring.flag_again
     7       a viscous contact             switching.is_relaxing
     8       a force law asks              changes.turn_wishes, changes.segment_at
     8       and changes                   switching.is_firm, decision.is_latest
@@ -23,16 +23,12 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     11      beside friction               rebounds.collide_and_rebound
     11      the last bounce               bounces.last_bounce, bounces.keep_landing
     12      friction at rest              sticking.stick_together, sticking.decide_at_rest, sticking.choose
-    12      beside rigid contacts         sticking.let_go, sticking.hold_without, independence.follows
-    12      redundant friction            at_rest.sort_by_reserve, sticking.thin_out_idle, independence.thin_out
+    12      beside rigid contacts         sticking.let_go, sticking.hold_without, redundancy.follows
+    12      redundant friction            friction_problem.sort_by_reserve, sticking.thin_out_idle, redundancy.thin_out
     12      which of it is idle           changes.without_stick
     12      its impacts                   changes.bears_nothing, striking.slide_on
 
 The sentences themselves stand in decision, where an instant is decided: decide, settle, answer.
 
-Order: load_channels, excitation, pieces, channels, loaded_level, transition, defect_forms, state, exits, exit_table,
-loaded_levels, arrays, state_arrays, signals, maps, defect_sums, energies, drive, flow, impact_sizes, impact, phases,
-changes, independence, bounces, rebounds, resting, striking, switching, at_rest, sticking, decision, waiting, start,
-channel_arrays, element_arrays, work_forms, scratch_arrays, level_parts, level_records, level_tables, level_arrays,
-entering.
+Order: excitation, transitions, arrays, states, law, packing.
 """

@@ -12,6 +12,6 @@ equilibria. Where the equations are stated:
 Their solution in time is mathematics/free_response.py, of loads that vary mathematics/forced_response.py.
 
 Order: closed_directions, modal_base, build_base, static_response, level_modes, mode_figure, level_override, level,
-build_level, sliding, rest_with_friction, static_equilibrium, rest_under_forces, mode_choice, level_store,
+build_level, sliding, sliding_equilibrium, static_equilibrium, equilibrium_under_forces, mode_choice, level_store,
 shared_base, model_arguments, model.
 """

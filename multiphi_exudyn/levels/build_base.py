@@ -14,8 +14,8 @@ import numpy as np
 import scipy.sparse
 
 from multiphi_exudyn.levels.modal_base import ModalBase, parallel
-from multiphi_exudyn.mathematics.lowest_modes import HeldRows, LowestModes, lowest_modes
-from multiphi_exudyn.mathematics.modes import Modes, complete_modes
+from multiphi_exudyn.mathematics.eigenproblems.lowest_modes import HeldRows, LowestModes, lowest_modes
+from multiphi_exudyn.mathematics.eigenproblems.modes import Modes, complete_modes
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping

@@ -15,9 +15,9 @@ from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.level_modes import level_modes
 from multiphi_exudyn.levels.modal_base import INTERLACING, ModalBase
-from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
-from multiphi_exudyn.mathematics.modes import turned
-from multiphi_exudyn.mathematics.orthonormal import least_squares, orthonormal
+from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
+from multiphi_exudyn.mathematics.eigenproblems.modes import turned
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import least_squares, orthonormal
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 
 __all__ = ["build_level", "independent"]

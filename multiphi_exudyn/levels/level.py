@@ -27,9 +27,9 @@ from multiphi_exudyn.levels.level_override import LevelOverride
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.mode_figure import mode_figure
 from multiphi_exudyn.levels.static_response import Asymptotic, neutral_response, static_response
-from multiphi_exudyn.mathematics.coupled_response import modal_response
-from multiphi_exudyn.mathematics.free_response import ModalResponse, is_slow
-from multiphi_exudyn.mathematics.modes import NEAR
+from multiphi_exudyn.mathematics.eigenproblems.modes import NEAR
+from multiphi_exudyn.mathematics.response.coupled_response import modal_response
+from multiphi_exudyn.mathematics.response.free_response import ModalResponse, is_slow
 from multiphi_exudyn.mathematics.round_off import ZERO
 from multiphi_exudyn.mechanics.arguments import real_array
 

@@ -36,8 +36,8 @@ import scipy.sparse.linalg
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.modal_base import ModalBase
-from multiphi_exudyn.mathematics.modes import right_singular_vectors
-from multiphi_exudyn.mathematics.secular_equation import rank_one_modes
+from multiphi_exudyn.mathematics.eigenproblems.modes import right_singular_vectors
+from multiphi_exudyn.mathematics.eigenproblems.secular_equation import rank_one_modes
 
 __all__ = ["level_modes"]
 

@@ -13,7 +13,7 @@ from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.mode_choice import FIRST
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mathematics.lowest_modes import left_out
+from multiphi_exudyn.mathematics.eigenproblems.lowest_modes import left_out
 from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.structure import LinearStructure
 

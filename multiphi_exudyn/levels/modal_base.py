@@ -22,7 +22,7 @@ import numpy as np
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mathematics.modes import Modes
+from multiphi_exudyn.mathematics.eigenproblems.modes import Modes
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.element import Element

@@ -11,12 +11,12 @@ import numpy as np
 
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiTypeError
+from multiphi_exudyn.levels.equilibrium_under_forces import at_rest
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.level_override import LevelOverride
 from multiphi_exudyn.levels.level_store import LevelStore
 from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo
 from multiphi_exudyn.levels.model_arguments import check_directions, check_modes, check_overrides, checked_contacts
-from multiphi_exudyn.levels.rest_under_forces import at_rest
 from multiphi_exudyn.levels.shared_base import SharedBase
 from multiphi_exudyn.levels.sliding import sliding
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium

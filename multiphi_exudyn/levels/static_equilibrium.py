@@ -31,7 +31,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.modal_base import ModalBase
-from multiphi_exudyn.levels.rest_with_friction import rest_with_friction
+from multiphi_exudyn.levels.sliding_equilibrium import rest_with_friction
 from multiphi_exudyn.mechanics.element import ElementState, Exit
 
 __all__ = ["Equilibrium", "equilibrium"]

@@ -18,8 +18,8 @@ import numpy as np
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.modal_base import ModalBase
-from multiphi_exudyn.mathematics.compiled import Numbers, compiled, entry
-from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
+from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
+from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
 
 __all__ = ["Asymptotic", "neutral_response", "static_response"]

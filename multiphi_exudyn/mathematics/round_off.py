@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from multiphi_exudyn.mathematics.compiled import Numbers, compiled
+from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled
 
 __all__ = ["BALANCED", "CLEAR", "DEFECTIVE", "SLOW", "WORST_CONDITION", "ZERO", "all_finite", "clear_products"]
 __all__ += ["drop_round_off", "sign_of"]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.mathematics.piecewise_linear_fit import MOST_SEGMENTS, spread, with_segments
+from multiphi_exudyn.mathematics.functions.piecewise_linear_fit import MOST_SEGMENTS, spread, with_segments
 from multiphi_exudyn.mechanics.arguments import is_real
 
 __all__ = ["Function", "LawLines"]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
+from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
 from multiphi_exudyn.mechanics.arguments import is_real, real_array
 
 __all__ = ["Sampled"]

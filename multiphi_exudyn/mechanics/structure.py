@@ -19,7 +19,7 @@ import scipy.sparse
 
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.mathematics.modes import complete_modes
+from multiphi_exudyn.mathematics.eigenproblems.modes import complete_modes
 from multiphi_exudyn.mechanics.arguments import Matrix, is_real, one_of, real_array
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.dofs import DofTable, Place, dof_table, fixed_dofs

@@ -17,8 +17,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.mathematics.interpolation import FEW_SAMPLES, MANY_SAMPLES, Samples
-from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
+from multiphi_exudyn.mathematics.functions.interpolation import FEW_SAMPLES, MANY_SAMPLES, Samples
+from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.samples import Sampled
 

@@ -20,8 +20,8 @@ from multiphi_exudyn.mechanics.static_loads import StaticLoad
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.steady.settled_state import PeriodicLoad, SteadyState
 from multiphi_exudyn.steady.steady_state import at_frequency, settle_run
-from multiphi_exudyn.time.trajectory import Trajectory
-from multiphi_exudyn.time.warning_groups import grouped, issue, kept_back
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.warnings.warning_groups import grouped, issue, kept_back
 
 __all__ = ["FrequencyResponse", "frequency_response"]
 

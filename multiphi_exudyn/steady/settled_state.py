@@ -16,7 +16,7 @@ from multiphi_exudyn.mechanics.loads import HarmonicLoad
 from multiphi_exudyn.mechanics.moving_supports import BaseMotion
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.mechanics.time_functions import Harmonic
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["HIGHEST_ORDER", "SAMPLES", "PeriodicLoad", "SteadyState", "course_of", "frequency"]
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from multiphi_exudyn.steady.settled_state import HIGHEST_ORDER, SAMPLES, PeriodicLoad, SteadyState
 from multiphi_exudyn.steady.shooting import PeriodMap, Shooting
-from multiphi_exudyn.time.reliability import warnings_of
-from multiphi_exudyn.time.trajectory import Trajectory
-from multiphi_exudyn.time.warning_groups import grouped
+from multiphi_exudyn.time.reliability.run_warnings import warnings_of
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.warnings.warning_groups import grouped
 
 __all__ = ["CHUNK", "Search", "with_warnings"]
 

@@ -26,13 +26,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.events.state import State
+from multiphi_exudyn.events.transitions.state import State
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.element import friction_spring
 from multiphi_exudyn.mechanics.loads import Load
-from multiphi_exudyn.time.going_on import stops_moved
+from multiphi_exudyn.time.run.continuation import stops_moved
 from multiphi_exudyn.time.simulate import Run
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["ATTRACTS", "PeriodMap", "Shooting"]
 

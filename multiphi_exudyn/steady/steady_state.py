@@ -30,8 +30,8 @@ from multiphi_exudyn.steady.settled_state import PeriodicLoad, SteadyState, cour
 from multiphi_exudyn.steady.settling import CHUNK, Search, with_warnings
 from multiphi_exudyn.steady.shooting import PeriodMap
 from multiphi_exudyn.time.simulate import Run, holding, outside_of, started
-from multiphi_exudyn.time.trajectory import Trajectory
-from multiphi_exudyn.time.warning_groups import issue, kept_back
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.warnings.warning_groups import issue, kept_back
 
 __all__ = ["at_frequency", "settle_run", "steady_state"]
 

@@ -14,24 +14,24 @@ from typing import Protocol
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.events.entering import Start
-from multiphi_exudyn.events.excitation import Excitation
-from multiphi_exudyn.events.loaded_levels import LoadedLevels
+from multiphi_exudyn.events.excitation.excitation import Excitation
+from multiphi_exudyn.events.packing.start_arrays import Start
+from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
-from multiphi_exudyn.mathematics.compiled import available
+from multiphi_exudyn.mathematics.compiling.compiled import available
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.loads import Load, patterns, unchanging
-from multiphi_exudyn.time.base_share import base_warnings
-from multiphi_exudyn.time.going_on import going_on, nudged
-from multiphi_exudyn.time.motion import Motion, motion_of
-from multiphi_exudyn.time.refinement import to_tolerance
-from multiphi_exudyn.time.reliability import warnings_of
-from multiphi_exudyn.time.start import first_start
-from multiphi_exudyn.time.trajectory import Trajectory
-from multiphi_exudyn.time.truncation import adapted
-from multiphi_exudyn.time.warning_groups import issue
+from multiphi_exudyn.time.reliability.run_warnings import warnings_of
+from multiphi_exudyn.time.reliability.truncation import adapted
+from multiphi_exudyn.time.run.continuation import going_on, nudged
+from multiphi_exudyn.time.run.motion import Motion, motion_of
+from multiphi_exudyn.time.run.refinement import to_tolerance
+from multiphi_exudyn.time.run.start import first_start
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.warnings.base_warnings import base_warnings
+from multiphi_exudyn.time.warnings.warning_groups import issue
 
 __all__ = [
     "Run",

@@ -16,11 +16,11 @@ from random_campaign import main, nudged, recipe_of, verdicts
 from strategies import CHOICES, Recipe, built, cases, recipes
 
 from multiphi_exudyn import ConstantLoad, LinearStructure, MultiPhiModel, UnilateralContact, simulate
-from multiphi_exudyn.mathematics import signal_bounds
-from multiphi_exudyn.mathematics.zero_crossing import NONE, first_descent
+from multiphi_exudyn.mathematics.search import signal_bounds
+from multiphi_exudyn.mathematics.search.zero_crossing import NONE, first_descent
 from multiphi_exudyn.study.stability.run_laws import complaints, missed
 from multiphi_exudyn.study.stability.run_signals import Signal
-from multiphi_exudyn.time import loop
+from multiphi_exudyn.time.loop import loop
 
 DISTINCT = ("chain", "free chain", "dense", "wide")  # frequencies: of repeated ones a truncated basis may keep any
 DENSE = 1e4  # samples of the shortest period

@@ -2,8 +2,8 @@
 
 import pytest
 
-from multiphi_exudyn.time import motion
-from multiphi_exudyn.time.loop import advance
+from multiphi_exudyn.time.loop.loop import advance
+from multiphi_exudyn.time.run import motion
 
 
 @pytest.fixture(params=["compiled", "plain"])

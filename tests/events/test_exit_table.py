@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.exit_table import ExitTable
-from multiphi_exudyn.events.exits import ExitShares
+from multiphi_exudyn.events.transitions.exit_table import ExitTable
+from multiphi_exudyn.events.transitions.exits import ExitShares
 from multiphi_exudyn.mechanics.element import link_places
 
 ELEMENTS = [

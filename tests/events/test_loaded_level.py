@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose
 from small_structures import chain, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.excitation import Excitation
-from multiphi_exudyn.events.level_parts import from_base, level_parts, powers
-from multiphi_exudyn.events.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transition import Transition
+from multiphi_exudyn.events.excitation.excitation import Excitation
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.events.packing.level_parts import from_base, level_parts, powers
+from multiphi_exudyn.events.transitions.transition import Transition
 
 STOPS = (stop("m1", 0.2), stop("m4", 0.1, 30.0, "soft"), stop("m2", 0.1, 20.0, "law"))
 LOADS = (

@@ -6,8 +6,8 @@ from numpy.testing import assert_array_equal
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.excitation import Excitation
-from multiphi_exudyn.events.pieces import Pieces
+from multiphi_exudyn.events.excitation.excitation import Excitation
+from multiphi_exudyn.events.excitation.pieces import Pieces
 
 GRID = np.linspace(0.5, 2.0, 7)
 SAMPLES = mp.SampledLoad("m1", GRID, np.cos(GRID))

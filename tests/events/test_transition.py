@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 from small_structures import chain, random_model, stop
 
 from multiphi_exudyn import LinearStructure, MultiPhiModel
-from multiphi_exudyn.events.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transition import Transition
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.events.transitions.transition import Transition
 
 
 def loaded(model, closed, load=None):

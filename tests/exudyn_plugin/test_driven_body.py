@@ -10,7 +10,7 @@ from exudyn.itemInterface import CoordinateSpringDamper, LoadCoordinate, MarkerN
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.state import Phase
+from multiphi_exudyn.events.transitions.state import Phase
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 from multiphi_exudyn.exudyn_plugin.body.certified_step import jump_times
 from reference_models.exudyn_quiet import quiet

@@ -7,14 +7,14 @@ import pytest
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events import level_arrays
+from multiphi_exudyn.events.packing import level_arrays
 from multiphi_exudyn.exudyn_plugin.coupling import exact_motion
 from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedInertia, PointInertia
 from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import ExactMotion
 from multiphi_exudyn.exudyn_plugin.coupling.interface import _direct_reactions
 from multiphi_exudyn.exudyn_plugin.coupling.modal_force import LevelForces
-from multiphi_exudyn.time import chatter
-from multiphi_exudyn.time.loop import advance
+from multiphi_exudyn.time.loop import chatter
+from multiphi_exudyn.time.loop.loop import advance
 from multiphi_exudyn.time.simulate import Run
 
 T_END = 6.0

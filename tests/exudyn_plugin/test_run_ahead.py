@@ -9,13 +9,13 @@ import pytest
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.loaded_level import LoadedLevel
-from multiphi_exudyn.events.state import Phase
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.events.transitions.state import Phase
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 from multiphi_exudyn.exudyn_plugin.body.run_ahead import RunAhead
 from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedSteps
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.time.loop import advance
+from multiphi_exudyn.time.loop.loop import advance
 from reference_models.solver_settings import fixed_steps
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")
@@ -127,7 +127,7 @@ def test_a_function_of_the_user_changes_the_way_and_not_the_answer(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_without_the_compiled_loop_it_is_the_same(kind, monkeypatch):
-    monkeypatch.setattr("multiphi_exudyn.time.motion.carry", advance)
+    monkeypatch.setattr("multiphi_exudyn.time.run.motion.carry", advance)
     model = model_of(KINDS[kind])
     native, found = mp.simulate(model, T_END, velocity=VELOCITY), System(model, matchedStepSize=STEP).solve()
     assert same_events(found.events, native.events)
@@ -166,8 +166,8 @@ def test_a_failure_on_the_way_is_told_when_exudyn_gets_there(monkeypatch):
     model = model_of(50.0)
     native = mp.simulate(model, T_END, velocity=VELOCITY)
     system = System(model, matchedStepSize=STEP)
-    monkeypatch.setattr("multiphi_exudyn.time.chatter.CHATTER_WINDOW", 4)
-    monkeypatch.setattr("multiphi_exudyn.time.chatter.EVENTS_PER_PERIOD", 0.01)
+    monkeypatch.setattr("multiphi_exudyn.time.loop.chatter.CHATTER_WINDOW", 4)
+    monkeypatch.setattr("multiphi_exudyn.time.loop.chatter.EVENTS_PER_PERIOD", 0.01)
     model.entries.clear()  # what it has kept of the check
     with pytest.raises(mp.MultiPhiError, match=r"body 'body': at t = .* chatter"):
         system.solve()

@@ -7,16 +7,11 @@ from unittest import mock
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.mathematics import (
-    basis_arrays,
-    compiled,
-    complementarity,
-    free_rows,
-    response_arrays,
-    signal_bounds,
-    zero_crossing,
-)
-from multiphi_exudyn.mathematics.least_distance import Infeasible
+from multiphi_exudyn.mathematics.compiling import compiled
+from multiphi_exudyn.mathematics.complementarity import free_rows, principal_pivoting
+from multiphi_exudyn.mathematics.complementarity.least_distance import Infeasible
+from multiphi_exudyn.mathematics.response import basis_arrays, response_arrays
+from multiphi_exudyn.mathematics.search import signal_bounds, zero_crossing
 
 
 class Signals(NamedTuple):
@@ -146,7 +141,7 @@ class Search:
 
 
 def complementary(rows, pushes, values, sizes, low, high, leaders=None, ties=None, in_turn=0, run=fast):
-    """(x, z, answer, rows that exclude each other) of complementarity.py; pushes None: the rows themselves."""
+    """(x, z, answer, rows that exclude each other) of principal_pivoting.py; pushes None: the rows themselves."""
     (k, r), buffers = rows.shape, Buffers()
     given = [buffers.put_numbers(rows)]
     given.append(given[0] if pushes is None else buffers.put_numbers(pushes))
@@ -154,11 +149,11 @@ def complementary(rows, pushes, values, sizes, low, high, leaders=None, ties=Non
     led = buffers.put_ints(np.full(k, -1) if leaders is None else leaders)
     tied = buffers.put_numbers(np.zeros(k) if ties is None else ties)
     x, z = buffers.put_numbers(np.zeros(r)), buffers.put_numbers(np.zeros(k))
-    scratch = buffers.put_numbers(np.full(complementarity.problem_numbers(k, r), np.nan))
-    problem = buffers.put_ints(np.full(complementarity.problem_ints(k), -1))
-    complementarity.lay_out(buffers.ints, problem, k, r, scratch)
-    complementarity.pose(buffers.ints, problem, k, r, r, *given, led, tied, x, z)
-    answer = run(complementarity.solve)(*buffers.all[:2], problem, in_turn)
+    scratch = buffers.put_numbers(np.full(principal_pivoting.problem_numbers(k, r), np.nan))
+    problem = buffers.put_ints(np.full(principal_pivoting.problem_ints(k), -1))
+    principal_pivoting.lay_out(buffers.ints, problem, k, r, scratch)
+    principal_pivoting.pose(buffers.ints, problem, k, r, r, *given, led, tied, x, z)
+    answer = run(principal_pivoting.solve)(*buffers.all[:2], problem, in_turn)
     listed = buffers.ints[problem + free_rows.EXCLUDED_ROWS]
     excluded = buffers.ints[listed:][: buffers.ints[problem + free_rows.EXCLUDING]].tolist()
     return buffers.numbers[x : x + r].copy(), buffers.numbers[z : z + k].copy(), answer, excluded
@@ -168,9 +163,9 @@ def distance_in_buffers(rows, least, sizes, run=fast):
     """``least_distance`` in buffers, with its failures."""
     zero = np.zeros(len(least))
     x, p, answer, excluded = complementary(rows, None, -least, sizes, zero, zero + np.inf, run=run)
-    if answer == complementarity.EXCLUDED:
+    if answer == principal_pivoting.EXCLUDED:
         raise Infeasible(excluded)
-    if answer == complementarity.UNDECIDED:
+    if answer == principal_pivoting.UNDECIDED:
         raise NumericalFailure("least distance: round-off decides which inequalities push")
     return x, p
 

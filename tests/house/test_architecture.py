@@ -17,17 +17,20 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 BESIDE = ("reference_models", "exudyn_plugin")  # a package beside the house, and the room after which it stands
-COMPILERS = ("multiphi_exudyn/mathematics/translation.py", "multiphi_exudyn/mathematics/machine_code.py")
+COMPILERS = (
+    "multiphi_exudyn/mathematics/compiling/translation.py",
+    "multiphi_exudyn/mathematics/compiling/machine_code.py",
+)
 HEAVY = {
     "exudyn": ("multiphi_exudyn/exudyn_plugin", "reference_models"),
     "matplotlib": (
         "multiphi_exudyn/study",
         "multiphi_exudyn/levels/mode_figure.py",
         "multiphi_exudyn/levels/level.py",
-        "multiphi_exudyn/time/history_figure.py",
-        "multiphi_exudyn/time/histories.py",
+        "multiphi_exudyn/time/trajectory/history_figure.py",
+        "multiphi_exudyn/time/trajectory/histories.py",
     ),
-    "pandas": ("multiphi_exudyn/study", "multiphi_exudyn/time/histories.py"),
+    "pandas": ("multiphi_exudyn/study", "multiphi_exudyn/time/trajectory/histories.py"),
     "numba": COMPILERS,
     "llvmlite": COMPILERS,
     "distributed": ("multiphi_exudyn/study/sweep",),
@@ -36,8 +39,8 @@ HEAVY = {
     "pyyeti": ("multiphi_exudyn/mechanics/array_files.py",),
 }
 WITH_NUMBA = (  # may be imported inside a function, as numba may
-    "multiphi_exudyn.mathematics.compilation",
-    "multiphi_exudyn.mathematics.machine_code",
+    "multiphi_exudyn.mathematics.compiling.compilation",
+    "multiphi_exudyn.mathematics.compiling.machine_code",
 )
 LATE = (  # load what they name when it is asked for: a command's own module, the public names
     "multiphi_exudyn.cli.main",
@@ -129,9 +132,9 @@ BREACHES = {
     "what stands beside": ("time.simulate", "import reference_models.rig"),
     "for a type checker": ("levels.level", "if TYPE_CHECKING:\n    from multiphi_exudyn.levels import model"),
     "inside a function": ("levels.level", "def f():\n    from multiphi_exudyn.events import exits"),
-    "by a string": ("levels.level", "importlib.import_module('multiphi_exudyn.events.exits').after"),
-    "by a string alone": ("levels.level", "f = import_module('multiphi_exudyn.events.exits')"),
-    "by the built-in": ("levels.level", "__import__('multiphi_exudyn.events.exits')"),
+    "by a string": ("levels.level", "importlib.import_module('multiphi_exudyn.events.transitions.exits').after"),
+    "by a string alone": ("levels.level", "f = import_module('multiphi_exudyn.events.transitions.exits')"),
+    "by the built-in": ("levels.level", "__import__('multiphi_exudyn.events.transitions.exits')"),
 }
 
 
@@ -149,7 +152,7 @@ def test_an_import_that_hides_what_it_imports_is_refused(code):
 
 LET_PASS = {
     "an earlier file": ("multiphi_exudyn.levels.model", "from multiphi_exudyn.levels.level import Level"),
-    "an earlier room": ("multiphi_exudyn.levels.model", "import multiphi_exudyn.mathematics.modes"),
+    "an earlier room": ("multiphi_exudyn.levels.model", "import multiphi_exudyn.mathematics.eigenproblems.modes"),
     "what is in it": ("multiphi_exudyn", "from multiphi_exudyn.time.simulate import simulate"),
     "the plugin": ("reference_models.rig", "from multiphi_exudyn.exudyn_plugin import reduce"),
     "a reference": ("multiphi_exudyn.study.running.runs", "from reference_models.rig import rig_beam"),

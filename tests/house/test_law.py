@@ -9,7 +9,7 @@ import re
 import pytest
 
 from multiphi_exudyn import events, levels
-from multiphi_exudyn.events import decision
+from multiphi_exudyn.events.law import decision
 
 NAME = re.compile(r"\b([a-z_]+)\.([A-Za-z_.]*[A-Za-z_])\b")
 ROW = re.compile(r"^    (\(38\.\d\)|\d+) (.*)$", re.MULTILINE)

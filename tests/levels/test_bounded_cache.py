@@ -10,10 +10,10 @@ import pytest
 from small_structures import bed, chain, stop
 
 from multiphi_exudyn import ConstantLoad, HarmonicLoad, MultiPhiModel, simulate
-from multiphi_exudyn.events import level_arrays
+from multiphi_exudyn.events.packing import level_arrays
 from multiphi_exudyn.levels import level_store
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.time import motion
+from multiphi_exudyn.time.run import motion
 
 TIMES = np.linspace(0.0, 0.04, 40)
 

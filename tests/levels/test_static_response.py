@@ -9,7 +9,7 @@ from small_structures import chain
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.levels.static_response import bend_one, static_response
-from multiphi_exudyn.mathematics.compiled import entry
+from multiphi_exudyn.mathematics.compiling.compiled import entry
 
 
 def base_of(stiffness):

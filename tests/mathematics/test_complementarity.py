@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from multiphi_exudyn.mathematics.complementarity import EXCLUDED, SOLVED, UNDECIDED
+from multiphi_exudyn.mathematics.complementarity.principal_pivoting import EXCLUDED, SOLVED, UNDECIDED
 
 PLAIN, SKEW, COULOMB = "symmetric", "not symmetric", "tied bounds"
 NONE, SURE = -1, 1e-9

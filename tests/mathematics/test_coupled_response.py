@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.linalg import expm
 
-from multiphi_exudyn.mathematics.coupled_response import modal_response
-from multiphi_exudyn.mathematics.forced_response import particular
-from multiphi_exudyn.mathematics.motion_parts import parts_of
+from multiphi_exudyn.mathematics.response.coupled_response import modal_response
+from multiphi_exudyn.mathematics.response.forced_response import particular
+from multiphi_exudyn.mathematics.response.motion_parts import parts_of
 
 
 def exactly(squares, damping, coupling, start, force, t, rate=0.0):

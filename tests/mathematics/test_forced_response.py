@@ -5,8 +5,8 @@ import pytest
 from carriers import CARRIERS
 from numpy.testing import assert_allclose
 
-from multiphi_exudyn.mathematics.coupled_response import modal_response
-from multiphi_exudyn.mathematics.forced_response import particular
+from multiphi_exudyn.mathematics.response.coupled_response import modal_response
+from multiphi_exudyn.mathematics.response.forced_response import particular
 
 OMEGA = np.array([0.0, 1.0, 1.0001, 5.0, 25.0, 300.0])
 DIAGONAL = np.diag([0.0, 0.0, 0.02, 10.0, 50.0, 3.0])  # rigid, undamped, lightly damped, critical twice, stiff

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad_vec
 
 from multiphi_exudyn import NumericalFailure
-from multiphi_exudyn.mathematics.coupled_response import modal_response
-from multiphi_exudyn.mathematics.exponentials import exponential_integrals
+from multiphi_exudyn.mathematics.response.coupled_response import modal_response
+from multiphi_exudyn.mathematics.response.exponentials import exponential_integrals
 
 
 def by_matrix_exponential(omega, damping, displacement, velocity, force, t):

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.linalg import expm
 
-from multiphi_exudyn.mathematics import light_damping
-from multiphi_exudyn.mathematics.coupled_response import modal_response
-from multiphi_exudyn.mathematics.light_damping import lightly_damped
+from multiphi_exudyn.mathematics.response import light_damping
+from multiphi_exudyn.mathematics.response.coupled_response import modal_response
+from multiphi_exudyn.mathematics.response.light_damping import lightly_damped
 
 
 def chain(seed, r, ratio):

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from multiphi_exudyn import Beam, Clamp, MultiPhiValueError, NumericalFailure, Section, mathematics, planar_beam
-from multiphi_exudyn.mathematics.lowest_modes import _Lowest, lowest_modes
-from multiphi_exudyn.mathematics.modes import complete_modes, right_singular_vectors
+from multiphi_exudyn.mathematics.eigenproblems.lowest_modes import _Lowest, lowest_modes
+from multiphi_exudyn.mathematics.eigenproblems.modes import complete_modes, right_singular_vectors
 
 
 def chain(n, *, ends=1):

@@ -6,9 +6,10 @@ from buffer_records import Buffers, fast
 from carriers import CARRIERS
 from numpy.testing import assert_allclose
 
-from multiphi_exudyn.mathematics import compiled, response_arrays
-from multiphi_exudyn.mathematics.coupled_response import modal_response
-from multiphi_exudyn.mathematics.forced_response import particular
+from multiphi_exudyn.mathematics.compiling import compiled
+from multiphi_exudyn.mathematics.response import response_arrays
+from multiphi_exudyn.mathematics.response.coupled_response import modal_response
+from multiphi_exudyn.mathematics.response.forced_response import particular
 
 SQUARES = np.array([0.0, 1.0, 1.0001, 25.0, -4.0, 9e4])
 DIAGONAL = np.diag([0.0, 0.0, 0.02, 10.0, 1.0, 3.0])

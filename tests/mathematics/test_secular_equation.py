@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from multiphi_exudyn.mathematics import secular_equation
-from multiphi_exudyn.mathematics.secular_equation import rank_one_modes
+from multiphi_exudyn.mathematics.eigenproblems import secular_equation
+from multiphi_exudyn.mathematics.eigenproblems.secular_equation import rank_one_modes
 
 COUNT = 12
 STIFFNESSES = [1e-6, 1.0, 1e3, 1e9, math.inf]

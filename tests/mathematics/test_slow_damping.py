@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from slow_mass import free_mass
 
-from multiphi_exudyn.mathematics.coupled_response import modal_response
-from multiphi_exudyn.mathematics.forced_response import particular
+from multiphi_exudyn.mathematics.response.coupled_response import modal_response
+from multiphi_exudyn.mathematics.response.forced_response import particular
 from multiphi_exudyn.mathematics.round_off import SLOW
 
 RATES = [0.0, *10.0 ** np.arange(-14, 2.1, 0.5)]  # 1/s

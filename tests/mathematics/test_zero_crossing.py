@@ -7,10 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from multiphi_exudyn.mathematics import compiled, zero_crossing
-from multiphi_exudyn.mathematics.exponentials import Exponentials
+from multiphi_exudyn.mathematics.compiling import compiled
+from multiphi_exudyn.mathematics.response.exponentials import Exponentials
 from multiphi_exudyn.mathematics.round_off import CLEAR, ZERO
-from multiphi_exudyn.mathematics.signal_bounds import DERIVATIVES
+from multiphi_exudyn.mathematics.search import zero_crossing
+from multiphi_exudyn.mathematics.search.signal_bounds import DERIVATIVES
 
 CASES = 30  # of every kind
 DENSE = 20_001  # samples of a signal in its horizon

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mathematics.modes import complete_modes
+from multiphi_exudyn.mathematics.eigenproblems.modes import complete_modes
 from multiphi_exudyn.mechanics.beam import Beam
 from multiphi_exudyn.mechanics.section import Section
 from multiphi_exudyn.mechanics.structure import damping_matrix

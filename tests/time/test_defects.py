@@ -10,8 +10,8 @@ from small_structures import chain
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.time.defects import defects, total_defect
-from multiphi_exudyn.time.segment import listed
+from multiphi_exudyn.time.reliability.defects import defects, total_defect
+from multiphi_exudyn.time.segments.segment import listed
 from multiphi_exudyn.time.simulate import Run
 
 

@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose
 from small_structures import chain, random_model
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.excitation import Excitation
-from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.events.excitation.excitation import Excitation
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 
 TIMES = np.linspace(0.0, 20.0, 101)
 PLACE = np.eye(3)[1]

@@ -11,13 +11,14 @@ from small_structures import bed, chain, oscillator, random_model, stop
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.errors import MultiPhiError
-from multiphi_exudyn.events import level_arrays
-from multiphi_exudyn.events.state import Phase
-from multiphi_exudyn.mathematics import compiled
-from multiphi_exudyn.mathematics.compiled import entry
-from multiphi_exudyn.time import chatter, motion
-from multiphi_exudyn.time.loop import advance
-from multiphi_exudyn.time.reliability import warnings_of
+from multiphi_exudyn.events.packing import level_arrays
+from multiphi_exudyn.events.transitions.state import Phase
+from multiphi_exudyn.mathematics.compiling import compiled
+from multiphi_exudyn.mathematics.compiling.compiled import entry
+from multiphi_exudyn.time.loop import chatter
+from multiphi_exudyn.time.loop.loop import advance
+from multiphi_exudyn.time.reliability.run_warnings import warnings_of
+from multiphi_exudyn.time.run import motion
 from multiphi_exudyn.time.simulate import Run, simulate
 from reference_models.rig import rig_beam, rig_contact, rig_damping
 

@@ -11,13 +11,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from small_structures import bed, chain, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.level_arrays import LevelArrays
-from multiphi_exudyn.mathematics.compiled import available
-from multiphi_exudyn.time import several, workers
-from multiphi_exudyn.time.motion import Motion
+from multiphi_exudyn.events.packing.level_arrays import LevelArrays
+from multiphi_exudyn.mathematics.compiling.compiled import available
+from multiphi_exudyn.time.many import batch, workers
+from multiphi_exudyn.time.run.motion import Motion
+from multiphi_exudyn.time.run.start import first_start
 from multiphi_exudyn.time.simulate import Run
-from multiphi_exudyn.time.start import first_start
-from multiphi_exudyn.time.warning_groups import kept_back
+from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
 END = 6.0
 TIMES = np.linspace(0, END, 13)
@@ -67,7 +67,7 @@ def carried(arrays, starts, sums_works=True):
         motion.advance(END)
     motion = Motion(arrays, starts[0])
     motion.sums_works = sums_works
-    return several.Several.carried(motion, starts, END, lambda function, *given: function(*given))
+    return batch.Several.carried(motion, starts, END, lambda function, *given: function(*given))
 
 
 LOADS = {
@@ -117,7 +117,7 @@ def test_a_tolerance_is_decided_by_the_first_run():
 
 @pytest.mark.parametrize("known", [True, False], ids=["compiled", "plain Python"])
 def test_there_are_as_many_threads_as_cores_where_the_loop_is_compiled(known, monkeypatch):
-    monkeypatch.setattr("multiphi_exudyn.time.many.available", lambda: known)
+    monkeypatch.setattr("multiphi_exudyn.time.many.many.available", lambda: known)
     monkeypatch.setattr("os.cpu_count", lambda: 3)
     pools = []
     pool = workers.ThreadPoolExecutor
@@ -134,9 +134,9 @@ class TestSeveralRunsTogether:
     def calls(self, monkeypatch):
         """(Of several runs, by one call: how many came to their ends; of one run)."""
         together, single = [], []
-        carry_several, carry = several.carry_several, workers.carry
+        carry_several, carry = batch.carry_several, workers.carry
         monkeypatch.setattr(
-            several, "carry_several", lambda *given: together.append(carry_several(*given)) or together[-1]
+            batch, "carry_several", lambda *given: together.append(carry_several(*given)) or together[-1]
         )
         monkeypatch.setattr(workers, "carry", lambda *given: single.append(1) or carry(*given))
         return together, single
@@ -247,7 +247,7 @@ class TestARunThatFails:
         assert "NaN" in found.messages[3]
         assert np.all(np.isnan(found.samples[[1, 3]]))
         assert np.all(np.isfinite(found.samples[[0, 2, 4]]))
-        monkeypatch.setattr("multiphi_exudyn.time.motion.limits", lambda model: (2, 1e-3))
+        monkeypatch.setattr("multiphi_exudyn.time.run.motion.limits", lambda model: (2, 1e-3))
         found = mp.simulate_many(model("all"), END, x[:1], points=["m5"], times=TIMES)
         assert found.status == ("failed",)
         assert "chatter" in found.messages[0]

@@ -6,8 +6,8 @@ from numpy.testing import assert_array_equal
 from small_structures import chain, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events import level_arrays
-from multiphi_exudyn.time.growing import FILLED
+from multiphi_exudyn.events.packing import level_arrays
+from multiphi_exudyn.time.record.growing_array import FILLED
 
 
 def record_of(run):

@@ -14,11 +14,11 @@ from numpy.testing import assert_allclose
 from small_structures import chain, random_model, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.state import event_table
-from multiphi_exudyn.time import chatter
-from multiphi_exudyn.time.defects import defects
-from multiphi_exudyn.time.reliability import warnings_of
-from multiphi_exudyn.time.rubbing import rubbing_warnings
+from multiphi_exudyn.events.transitions.state import event_table
+from multiphi_exudyn.time.loop import chatter
+from multiphi_exudyn.time.reliability.defects import defects
+from multiphi_exudyn.time.reliability.friction_warnings import rubbing_warnings
+from multiphi_exudyn.time.reliability.run_warnings import warnings_of
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 
 END = 0.3

@@ -9,8 +9,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events import level_arrays
-from multiphi_exudyn.time import record, segment
+from multiphi_exudyn.events.packing import level_arrays
+from multiphi_exudyn.time.record import record
+from multiphi_exudyn.time.segments import segment
 from multiphi_exudyn.time.simulate import Run
 
 STOPS = (mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0))

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mathematics import signal_bounds
+from multiphi_exudyn.mathematics.search import signal_bounds
 from multiphi_exudyn.time.simulate import Run
 from reference_models.rig import rig_beam, rig_contact, rig_damping
 

@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 from slow_mass import free_mass
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.excitation import Excitation
-from multiphi_exudyn.events.loaded_levels import LoadedLevels
+from multiphi_exudyn.events.excitation.excitation import Excitation
+from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.study.stability.run_laws import complaints
 
 RATES = [1e-14, 1e-11, 4e-8, 1e-6, 1e-4, 1e-2, 1.0, 100.0]  # 1/s

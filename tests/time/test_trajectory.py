@@ -11,10 +11,10 @@ from scipy.integrate import quad
 from small_structures import chain, oscillator, random_model, stop
 
 from multiphi_exudyn import ConstantLoad, MultiPhiModel, RayleighDamping, simulate
-from multiphi_exudyn.events.state import total_impulse
-from multiphi_exudyn.time.record import Record
-from multiphi_exudyn.time.recorded import Events, Recorded
-from multiphi_exudyn.time.segment import Listed
+from multiphi_exudyn.events.transitions.state import total_impulse
+from multiphi_exudyn.time.record.record import Record
+from multiphi_exudyn.time.record.recorded_segments import Events, Recorded
+from multiphi_exudyn.time.segments.segment import Listed
 
 SOFT = 40.0
 LOAD = -0.7

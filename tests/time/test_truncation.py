@@ -10,8 +10,8 @@ from scipy.stats import spearmanr
 from small_structures import chain, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.time.defects import defects
-from multiphi_exudyn.time.truncation import adapted
+from multiphi_exudyn.time.reliability.defects import defects
+from multiphi_exudyn.time.reliability.truncation import adapted
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 
 END = 0.3

@@ -8,8 +8,8 @@ from integrated import integrated
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.excitation import MOST_EFFORT
-from multiphi_exudyn.time import reliability
+from multiphi_exudyn.events.excitation.excitation import MOST_EFFORT
+from multiphi_exudyn.time.reliability import run_warnings
 
 TIMES = np.linspace(0.0, 2.0, 81)
 STOPS = (mp.UnilateralContact("below", "m2", 0.02, 500.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.03, 300.0))
@@ -143,7 +143,7 @@ class TestManyPieces:
         refused(ValueError, "loads: got 262144 pieces", mp.simulate, model, 100.0, loads=[load])
 
     def test_many_are_told(self, monkeypatch):
-        monkeypatch.setattr(reliability, "MANY_PIECES", 100)
+        monkeypatch.setattr(run_warnings, "MANY_PIECES", 100)
         load = mp.SampledLoad("m0", np.linspace(0.0, 1.0, 201), np.random.default_rng(0).normal(size=201))
         model = mp.MultiPhiModel(chain(1), modes="all")
         with pytest.warns(

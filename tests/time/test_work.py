@@ -9,8 +9,8 @@ from small_structures import chain, oscillator
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.events import arrays
-from multiphi_exudyn.time import record
-from multiphi_exudyn.time.segment import Listed, listed
+from multiphi_exudyn.time.record import record
+from multiphi_exudyn.time.segments.segment import Listed, listed
 from multiphi_exudyn.time.simulate import Run
 
 COMPLIANT = (mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0))

@@ -5,6 +5,6 @@ after every step: if an event may have occurred, the step is computed again exac
 function handles the events of all bodies of a system.
 
 Order: switching, run_record, level_data, coordinates, run_checks, undisturbed_steps, known_motion, certified_step,
-own_loads, stops, run_ahead, start_state, surroundings, exact_step, step_by_step, body, rebuilt, sensors, drawing,
-binding, solving, create.
+own_loads, event_steps, run_ahead, start_state, surroundings, exact_step, step_by_step, body, reconstruction,
+sensors, drawing, binding, solving, create.
 """

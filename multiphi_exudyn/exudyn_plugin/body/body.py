@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.events.state import Event, Loss, State, total_loss
+from multiphi_exudyn.events.transitions.state import Event, Loss, State, total_loss
 from multiphi_exudyn.exudyn_plugin.body.coordinates import SAME_STEP, Coordinates
 from multiphi_exudyn.exudyn_plugin.body.known_motion import KnownMotion
 from multiphi_exudyn.exudyn_plugin.body.level_data import LevelData
@@ -40,8 +40,8 @@ from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import ExactMotion
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.loads import Load
-from multiphi_exudyn.time.motion import Motion, motion_of
-from multiphi_exudyn.time.reliability import warnings_of_body
+from multiphi_exudyn.time.reliability.run_warnings import warnings_of_body
+from multiphi_exudyn.time.run.motion import Motion, motion_of
 
 __all__ = ["MultiPhiBody"]
 

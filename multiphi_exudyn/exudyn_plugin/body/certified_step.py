@@ -32,13 +32,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.events.excitation import Excitation
-from multiphi_exudyn.events.loaded_level import LoadedLevel
-from multiphi_exudyn.events.state import Row
+from multiphi_exudyn.events.excitation.excitation import Excitation
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.events.transitions.state import Row
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.mathematics.compiled import Ints, Numbers, compiled, entry
-from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
-from multiphi_exudyn.mathematics.signal_bounds import HERMITE
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
+from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
+from multiphi_exudyn.mathematics.search.signal_bounds import HERMITE
 
 __all__ = ["Conditions", "StepTest", "conditions_of", "jump_times"]
 

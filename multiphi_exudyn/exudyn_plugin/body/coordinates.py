@@ -15,7 +15,7 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
-from multiphi_exudyn.events.state import Phase
+from multiphi_exudyn.events.transitions.state import Phase
 from multiphi_exudyn.exudyn_plugin.body.level_data import LevelData
 from multiphi_exudyn.exudyn_plugin.coupling.interface import Interface
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel

@@ -26,9 +26,9 @@ from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
-from multiphi_exudyn.time.motion import Motion
+from multiphi_exudyn.time.run.motion import Motion
 from multiphi_exudyn.time.simulate import Run, holding, outside_of, started
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["CreateMultiPhiBody"]
 

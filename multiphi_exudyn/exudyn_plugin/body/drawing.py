@@ -23,7 +23,7 @@ from exudyn import graphics
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
-from multiphi_exudyn.exudyn_plugin.body.rebuilt import reconstruct
+from multiphi_exudyn.exudyn_plugin.body.reconstruction import reconstruct
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real, real_array
 from multiphi_exudyn.mechanics.beam import Beam

@@ -18,7 +18,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.events.state import State
+from multiphi_exudyn.events.transitions.state import State
 from multiphi_exudyn.exudyn_plugin.body.coordinates import Coordinates
 from multiphi_exudyn.exudyn_plugin.body.surroundings import Instant, Surroundings, surroundings_of
 from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import AdvanceResult, ExactMotion

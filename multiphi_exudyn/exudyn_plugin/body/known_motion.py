@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.events.loaded_level import LoadedLevel
-from multiphi_exudyn.events.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.state import Event, Phase, State
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
+from multiphi_exudyn.events.transitions.state import Event, Phase, State
 from multiphi_exudyn.levels.level import Level
-from multiphi_exudyn.time.motion import Motion
-from multiphi_exudyn.time.recorded import Recorded
-from multiphi_exudyn.time.segment import Segments
+from multiphi_exudyn.time.record.recorded_segments import Recorded
+from multiphi_exudyn.time.run.motion import Motion
+from multiphi_exudyn.time.segments.segment import Segments
 
 __all__ = ["KnownMotion", "LevelStates", "MotionInterval"]
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from multiphi_exudyn.events.state import Phase, State
+from multiphi_exudyn.events.transitions.state import Phase, State
 from multiphi_exudyn.levels.model import MultiPhiModel
 
 __all__ = ["LevelData"]

@@ -12,11 +12,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from multiphi_exudyn.events.excitation import Excitation
-from multiphi_exudyn.events.exits import exits_of, force_shares, signal_rows
-from multiphi_exudyn.events.loaded_level import LoadedLevel
-from multiphi_exudyn.events.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.state import Phase, State
+from multiphi_exudyn.events.excitation.excitation import Excitation
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.events.transitions.exits import exits_of, force_shares, signal_rows
+from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
+from multiphi_exudyn.events.transitions.state import Phase, State
 from multiphi_exudyn.exudyn_plugin.body.certified_step import Conditions, conditions_of, jump_times
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.levels.model import MultiPhiModel

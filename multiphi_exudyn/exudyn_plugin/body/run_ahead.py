@@ -1,6 +1,6 @@
 """Run ahead: a run of an isolated body, whose exact motion is computed ahead of Exudyn's steps.
 
-At the end of an event step (stops.py) the exact state is written, with the matrices of its level. Between event steps
+At the end of an event step (event_steps.py) the exact state is written, with the matrices of its level. Between event steps
 Exudyn's own steps need nothing of the body; it only compares the time with ``next_time``.
 
 Event steps are planned many steps ahead, for the present step size. Where a step ends at another time than planned, the
@@ -18,12 +18,18 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.events.state import Event
+from multiphi_exudyn.events.transitions.state import Event
 from multiphi_exudyn.exudyn_plugin.body.coordinates import SAME_STEP
+from multiphi_exudyn.exudyn_plugin.body.event_steps import (
+    EventSteps,
+    IsolatedBody,
+    PlanStart,
+    amplitudes,
+    plan_event_steps,
+)
 from multiphi_exudyn.exudyn_plugin.body.known_motion import KnownMotion
 from multiphi_exudyn.exudyn_plugin.body.run_checks import check_matched
 from multiphi_exudyn.exudyn_plugin.body.run_record import RunRecord
-from multiphi_exudyn.exudyn_plugin.body.stops import EventSteps, IsolatedBody, PlanStart, amplitudes, plan_event_steps
 from multiphi_exudyn.exudyn_plugin.body.undisturbed_steps import UndisturbedSteps
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 

@@ -1,10 +1,10 @@
-"""Record of a run in Exudyn: levels and energies, from which the warnings of a body are derived (reliability.py)."""
+"""Record of a run in Exudyn: levels and energies, from which the warnings of a body are derived (run_warnings.py)."""
 
 from __future__ import annotations
 
-from multiphi_exudyn.events.state import Loss, State
+from multiphi_exudyn.events.transitions.state import Loss, State
 from multiphi_exudyn.levels.level import Level
-from multiphi_exudyn.time.reliability import RunSummary
+from multiphi_exudyn.time.reliability.run_warnings import RunSummary
 
 __all__ = ["RunRecord"]
 

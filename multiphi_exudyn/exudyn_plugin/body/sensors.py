@@ -1,4 +1,4 @@
-"""Sensors of a Multi-Phi body, and histories that are computed from them after a run (rebuilt.py).
+"""Sensors of a Multi-Phi body, and histories that are computed from them after a run (reconstruction.py).
 
 Exudyn's own node sensors record eta, its derivatives and the level with its stick positions, at hardly any cost during
 a run.
@@ -17,9 +17,9 @@ from exudyn.itemInterface import SensorNode
 
 from multiphi_exudyn.display import Shown, kinds, names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.events.state import Event
+from multiphi_exudyn.events.transitions.state import Event
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
-from multiphi_exudyn.exudyn_plugin.body.rebuilt import reconstruct
+from multiphi_exudyn.exudyn_plugin.body.reconstruction import reconstruct
 from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of
 from multiphi_exudyn.mechanics.arguments import no_text
 from multiphi_exudyn.mechanics.element import links_of

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from multiphi_exudyn.events.state import State
+from multiphi_exudyn.events.transitions.state import State
 from multiphi_exudyn.exudyn_plugin.body.coordinates import Coordinates
 from multiphi_exudyn.exudyn_plugin.body.own_loads import OwnLoads
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel

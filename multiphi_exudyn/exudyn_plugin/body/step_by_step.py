@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.events.state import Event, Phase, State
+from multiphi_exudyn.events.transitions.state import Event, Phase, State
 from multiphi_exudyn.exudyn_plugin.body.certified_step import StepTest
 from multiphi_exudyn.exudyn_plugin.body.coordinates import SAME_STEP
 from multiphi_exudyn.exudyn_plugin.body.exact_step import BodyInStep, Step, exact_step

@@ -15,8 +15,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from multiphi_exudyn.events.loaded_level import LoadedLevel
-from multiphi_exudyn.events.state import State
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.events.transitions.state import State
 from multiphi_exudyn.exudyn_plugin.body.coordinates import Coordinates
 from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import PointInertia, Reactions
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel

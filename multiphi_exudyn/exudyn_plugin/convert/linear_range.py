@@ -19,7 +19,7 @@ from multiphi_exudyn.exudyn_plugin.convert.linearisation import Linearisation, M
 from multiphi_exudyn.exudyn_plugin.convert.range_check import TOLERANCE, RangeCheck
 from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["LinearLimits", "LinearRange"]
 

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mathematics.modes import Modes, complete_modes
+from multiphi_exudyn.mathematics.eigenproblems.modes import Modes, complete_modes
 
 __all__ = ["ASYMMETRY", "CheckedMatrices", "NotLinearStructure", "checked_matrices", "coordinate_name"]
 

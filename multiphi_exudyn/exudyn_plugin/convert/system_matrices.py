@@ -29,7 +29,7 @@ from multiphi_exudyn.exudyn_plugin.convert.matrix_checks import (
     NotLinearStructure,
     checked_matrices,
 )
-from multiphi_exudyn.exudyn_plugin.convert.moved import moved_directions
+from multiphi_exudyn.exudyn_plugin.convert.moved_directions import moved_directions
 from multiphi_exudyn.exudyn_plugin.convert.point_rows import coordinate_row
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 

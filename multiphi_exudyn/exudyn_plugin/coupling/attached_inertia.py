@@ -22,8 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.events.impact import IMMOVABLE
-from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.events.law.impact import IMMOVABLE
 from multiphi_exudyn.levels.modal_base import ModalBase
 
 __all__ = ["AttachedInertia", "PointInertia", "Reactions"]

@@ -13,16 +13,16 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.entering import set_state
-from multiphi_exudyn.events.level_arrays import LevelArrays
-from multiphi_exudyn.events.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.state import Event, State
+from multiphi_exudyn.events.packing.level_arrays import LevelArrays
+from multiphi_exudyn.events.packing.start_arrays import set_state
+from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
+from multiphi_exudyn.events.transitions.state import Event, State
 from multiphi_exudyn.exudyn_plugin.coupling.modal_force import ConstantForces, Inertia, LevelForces
-from multiphi_exudyn.time.chatter import limits
-from multiphi_exudyn.time.ending import NUMBERS
-from multiphi_exudyn.time.motion import Motion, carry, measured
-from multiphi_exudyn.time.record import PHASES, Record
-from multiphi_exudyn.time.recorded import Events
+from multiphi_exudyn.time.loop.chatter import limits
+from multiphi_exudyn.time.record.record import PHASES, Record
+from multiphi_exudyn.time.record.recorded_segments import Events
+from multiphi_exudyn.time.run.motion import Motion, carry, measured
+from multiphi_exudyn.time.trajectory.final_state import NUMBERS
 
 __all__ = ["AdvanceResult", "ExactMotion"]
 

@@ -20,10 +20,10 @@ from typing import Protocol
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.exits import after, asked_alone, exits_of, force_shares, way_back
-from multiphi_exudyn.events.level_arrays import LevelArrays
+from multiphi_exudyn.events.packing.level_arrays import LevelArrays
+from multiphi_exudyn.events.transitions.exits import after, asked_alone, exits_of, force_shares, way_back
 from multiphi_exudyn.levels.level import Level
-from multiphi_exudyn.mathematics.least_distance import INDEPENDENT
+from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
 
 __all__ = ["ConstantForces", "Inertia", "LevelForces", "static_shift"]
 

@@ -26,7 +26,7 @@ import numpy as np
 import scipy.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.events.loaded_level import LoadedLevel
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 
 __all__ = ["SteppedLevel"]
 

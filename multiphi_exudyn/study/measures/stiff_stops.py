@@ -28,7 +28,7 @@ from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
 from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.warning_groups import kept_back
+from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
 __all__ = ["StiffStops", "rigid_models", "stiff_stops"]
 

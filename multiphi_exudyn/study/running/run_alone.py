@@ -16,7 +16,7 @@ from typing import Any
 
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.warning_groups import kept_back
+from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
 __all__ = ["run_alone"]
 

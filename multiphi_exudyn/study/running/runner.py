@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from multiphi_exudyn.mathematics.compiled import available, compile_entries
+from multiphi_exudyn.mathematics.compiling.compiled import available, compile_entries
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.running.timing import repeated, timed
 from multiphi_exudyn.study.scene.workbench import Workbench, start_of

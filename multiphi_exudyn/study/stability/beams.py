@@ -17,7 +17,7 @@ from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.structures import differs, pulled, rig_problem, stop
 from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from reference_models.rig import rig_beam, rig_contact
 
 __all__ = ["CASES"]

@@ -19,12 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.events.exits import exits_of
-from multiphi_exudyn.events.state import Phase
+from multiphi_exudyn.events.transitions.exits import exits_of
+from multiphi_exudyn.events.transitions.state import Phase
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.moving_supports import BaseMotion, StopMotion
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = [
     "ContactSamples",

@@ -15,7 +15,7 @@ from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.structure import LinearStructure
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["STATIC_LOADS", "Case", "Problem", "Pull"]
 

@@ -16,7 +16,7 @@ from multiphi_exudyn.study.stability.exudyn_runs import (
 )
 from multiphi_exudyn.study.stability.native_run import Native, run_native
 from multiphi_exudyn.study.stability.outcome import NOT_RUN, CaseResult, Outcome
-from multiphi_exudyn.time.warning_groups import kept_back
+from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
 __all__ = ["CATALOGUE", "FULL_LENGTH", "QUICK", "Limits", "chosen_cases", "run_case"]
 

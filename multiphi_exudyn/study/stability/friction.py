@@ -14,7 +14,7 @@ from multiphi_exudyn.mechanics.planar_beam import planar_beam
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.structures import chain, in_a_row, stop, two_masses
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from reference_models.rig import rig_beam, rig_damping
 
 __all__ = ["CASES"]

@@ -35,7 +35,7 @@ from multiphi_exudyn.study.stability.brute_force import (
     untold_switches,
 )
 from multiphi_exudyn.study.stability.case import Problem
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["BEYOND", "Judgement", "judge"]
 

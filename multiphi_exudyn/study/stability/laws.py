@@ -12,7 +12,7 @@ from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.structures import STOP, stop, two_masses
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["CASES"]
 

@@ -10,12 +10,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from multiphi_exudyn.events.state import Phase
+from multiphi_exudyn.events.transitions.state import Phase
 from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.study.stability.run_signals import Signal
-from multiphi_exudyn.time.segment import Segment
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.segments.segment import Segment
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["complaints", "ends_of", "energy_rise", "largest_energy", "missed", "still"]
 

@@ -18,7 +18,7 @@ from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.structure import At, LinearStructure
 from multiphi_exudyn.study.stability.case import Problem, Pull
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import rig_beam, rig_contact
 

@@ -15,7 +15,7 @@ from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.starts import BILINEAR
 from multiphi_exudyn.study.stability.structures import differs, in_a_row, rig_problem, stop
 from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from reference_models.bars import clamped_bar, free_bar, nodes
 from reference_models.exact import BouncingBar
 

@@ -29,7 +29,7 @@ from typing import ParamSpec, TypeVar
 from threadpoolctl import threadpool_limits
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
-from multiphi_exudyn.mathematics.compiled import compile_entries
+from multiphi_exudyn.mathematics.compiling.compiled import compile_entries
 
 if sys.platform == "linux":
     import fcntl

@@ -1,0 +1,166 @@
+"""Channels: what a level makes of what varies, as prescribed coordinates xi = (eta, w) (eqs. 38.4 to 38.6).
+
+    x = Psi eta + y_inf + R w,   R w = (K_l^-1 - Psi omega^-2 Psi^T) (b w + k h s w)  +  Y w
+
+w (q,) the channels, b and s their patterns and stops (excitation.py). The first part is the quasi-static deflection of
+the modes left out (its inertia is neglected, its strain and the work of the load on it are not). Y holds the motion of
+rigid stops, the static shapes of eq. (38.5) with x_k(t); it has inertia:
+
+    eta'' + D eta' + omega^2 eta = P w + Q w',   P = Psi^T (b + k h s),   on w' as a channel of its own
+                                                 P = Psi^T (c h s - C Y),   Q = -Psi^T Y
+
+In xi every gap and contact force is again linear. Without channels xi = eta, and a level in xi is the level itself.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from multiphi_exudyn.events.excitation.excitation import Excitation
+from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.levels.sliding import SlidingLevel
+from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING
+from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
+
+__all__ = ["Channels"]
+
+
+@dataclass(frozen=True)
+class Channels:
+    """What a level makes of the channels of an excitation.
+
+    force, force_rate: P, Q (r, q). carried: Y (m, q). shapes: R (m, q), of which terms (m, q) they are the sum.
+    contact_force, contact_force_rate: forces (k, q) of the closed contacts at w = 1 and w' = 1.
+    """
+
+    force: np.ndarray
+    force_rate: np.ndarray
+    carried: np.ndarray
+    shapes: np.ndarray
+    terms: np.ndarray
+    contact_force: np.ndarray
+    contact_force_rate: np.ndarray
+
+    @classmethod
+    def none(cls, level: Level) -> Channels:
+        """Of a level under static loads alone."""
+        return _none(level.modes, level.base.modes.count, len(level.indices))
+
+    @classmethod
+    def of(cls, level: Level, excitation: Excitation) -> Channels:
+        """Of a level under an excitation; contacts that slide have the friction that goes with their forces."""
+        if not isinstance(level, SlidingLevel):
+            return cls._of(level, excitation, level)
+        plain = cls._of(level.plain, excitation, level)
+        prescribed, sliders = np.arange(plain.force.shape[1]) < excitation.prescribed, list(level.sliders)
+        contact_force = np.where(prescribed, level.answered(plain.contact_force), plain.contact_force)
+        contact_rate = level.answered(plain.contact_force_rate)
+        force = plain.force + prescribed * (level.pulled @ contact_force[sliders])
+        rate = plain.force_rate + level.pulled @ contact_rate[sliders]
+        return replace(
+            plain, force=force, force_rate=rate, contact_force=contact_force, contact_force_rate=contact_rate
+        )
+
+    @classmethod
+    def _of(cls, level: Level, excitation: Excitation, still: Level) -> Channels:
+        """Of a level without friction; still: the one whose state of rest is meant where channels are constant."""
+        base, index = level.base, list(level.indices)
+        rigid = np.isinf(base.stiffnesses[index])
+        stops, directions = excitation.stops[index], base.directions[:, index]
+        springs = np.where(rigid, 0.0, base.stiffnesses[index])
+        pushed = directions @ (springs[:, None] * stops)
+        force = level.vectors.T @ (excitation.patterns + pushed)
+        loaded, forces_loaded = _beyond(level, excitation.patterns)
+        sizes = np.linalg.norm(excitation.patterns, axis=0) / np.linalg.norm(directions, axis=0)[:, None]
+        forces_loaded = np.where(rigid[:, None], drop_round_off(forces_loaded, sizes), forces_loaded)
+        unloaded = np.zeros_like(excitation.patterns)
+        moved, forces_moved = _at_rest(level, unloaded, -stops)
+        if still is not level:
+            constant = slice(excitation.prescribed, None)
+            moved[:, constant], forces_moved[:, constant] = _at_rest(still, unloaded[:, constant], -stops[:, constant])
+        carried, _ = _at_rest(level, unloaded, np.where(rigid[:, None], -stops, 0.0))
+        centre = _centre(force, level.computed)
+        loaded = drop_round_off(loaded, np.abs(level.vectors) @ np.abs(centre))  # of all modes nothing is left out
+        modal = centre - _centre(force, level.squares) - _centre(level.vectors.T @ pushed, level.computed)
+        held = slice(excitation.prescribed, None)  # constant: motion is centred on the whole static response to them
+        force[:, held], modal[:, held] = 0.0, 0.0
+        shapes = loaded + moved + level.vectors @ modal
+        contact_force = forces_loaded + forces_moved + level.force_rows @ modal
+        rate, contact_rate = np.zeros_like(force), np.zeros_like(contact_force)
+        pinned = directions[:, rigid]
+        for k, derivative in enumerate(excitation.rate_of):
+            if derivative >= 0:
+                dampers = base.dampings[index] * (stops[:, k] - directions.T @ carried[:, k])  # forces at w' = 1
+                damped = base.damping @ carried[:, k] - directions @ dampers
+                force[:, derivative] -= level.vectors.T @ damped
+                rate[:, derivative] -= level.vectors.T @ carried[:, k]
+                contact_force[~rigid, derivative] += dampers[~rigid]
+                contact_force[rigid, derivative] += np.linalg.lstsq(pinned, damped, rcond=None)[0]
+                contact_rate[rigid, derivative] += np.linalg.lstsq(pinned, carried[:, k], rcond=None)[0]
+        terms = np.abs(moved) + np.abs(level.vectors) @ np.abs(centre)
+        return cls(force, rate, carried, shapes, terms, contact_force, contact_rate)
+
+    def extended(self, level: Level, stops: np.ndarray) -> Level:
+        """The level in the coordinates xi = (eta, w) (r + q); squares and damping are zero on w. stops: s (c, q)."""
+        directions, sizes = level.base.directions.T, level.base.magnitudes[0].T
+        gap_columns, speeds = directions @ self.shapes - stops, directions @ self.carried - stops
+        held = level.following[:, None]  # the channels move these by round-off only
+        moved, slack = np.abs(stops), FOLLOWING / ZERO
+        gap_columns = np.where(held, drop_round_off(gap_columns, slack * (sizes @ self.terms + moved)), gap_columns)
+        speeds = np.where(held, drop_round_off(speeds, slack * (sizes @ np.abs(self.carried) + moved)), speeds)
+        closed = [i for i in level.indices if np.isinf(level.base.stiffnesses[i])]
+        fixed = held & ~np.any(stops[closed], axis=0)  # by contacts whose stops such a channel does not move
+        gap_columns, speeds = np.where(fixed, -stops, gap_columns), np.where(fixed, -stops, speeds)
+        q = self.force.shape[1]
+        return Level(
+            closed=level.closed,
+            indices=level.indices,
+            base=level.base,
+            squares=np.concatenate([level.squares, np.zeros(q)]),
+            vectors=np.hstack([level.vectors, self.shapes]),
+            damping=np.pad(level.damping, (0, q)),
+            gap_rows=np.hstack([level.gap_rows, gap_columns]),
+            following=level.following,
+            speed_rows=np.hstack([level.gap_rows, speeds]),
+            force_rows=np.hstack([level.force_rows, self.contact_force]),
+            force_rate_rows=np.hstack([level.force_rate_rows, self.contact_force_rate]),
+            neutral=level.neutral,
+            computed=np.concatenate([level.computed, np.zeros(q)]),
+            kept_beyond=level.kept_beyond,
+        )
+
+
+@functools.lru_cache(maxsize=64)
+def _none(r: int, m: int, k: int) -> Channels:
+    """No channels, of a level with r modes, m coordinates and k closed contacts."""
+    of_modes, of_base, of_forces = (np.zeros((rows, 0)) for rows in (r, m, k))
+    return Channels(of_modes, of_modes, of_base, of_base, of_base, of_forces, of_forces)
+
+
+def _centre(force: np.ndarray, squares: np.ndarray) -> np.ndarray:
+    """omega^-2 P (r, q), zero on zero-frequency modes."""
+    return np.divide(force, squares[:, None], out=np.zeros_like(force), where=squares[:, None] != 0)
+
+
+def _at_rest(level: Level, loads: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Configurations (m, q) and contact forces (k, q) under loads (m, q), the closed contacts with gaps (k, q)."""
+    configurations, forces = np.zeros_like(loads), np.zeros_like(gaps)
+    for k in np.flatnonzero(np.any(loads, axis=0) | np.any(gaps, axis=0)).tolist():
+        forces[:, k], configurations[:, k] = level.static_response(loads[:, k], gaps[:, k])
+    return configurations, forces
+
+
+def _beyond(level: Level, patterns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Configurations (m, q) and contact forces (k, q) of loads at rest, without the part of the level's modes.
+
+    (K_l^-1 - Psi omega^-2 Psi^T) b as K_l^-1 (1 - Psi Psi^T) b: where a kept mode is soft, both terms of the former
+    are large. What is left of its part is round-off.
+    """
+    psi = level.vectors
+    left = patterns - psi @ (psi.T @ patterns)
+    y, forces = _at_rest(level, left, np.zeros((len(level.indices), left.shape[1])))
+    part = psi.T @ y
+    return y - psi @ part, forces - level.force_rows @ part

@@ -1,0 +1,153 @@
+"""Bounces of rigid contacts: their speeds, who has rebounded, and the last bounce of a sequence (sentence 11)."""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    ACCELERATION,
+    ARMED,
+    CHANGE_COUNT,
+    CHANGE_IMPULSES,
+    CHANGE_WIDTH,
+    CHANGES,
+    CHANNELS,
+    ELEMENTS,
+    EXIT_COUNT,
+    FAILED,
+    FIRST_CHANGE,
+    FIRST_EXITS,
+    FURTHER,
+    IMPULSES,
+    INSTANT_TIME,
+    KINDS,
+    LANDING,
+    LASTS,
+    LEVEL,
+    LOST_IN_IMPACT,
+    MODES,
+    OK,
+    OPEN,
+    PHASES,
+    REACHED,
+    RECOVERING,
+    RESTITUTIONS,
+    RIGID,
+    ROWS,
+    SETTLED,
+    SPEED,
+    SPEEDS,
+    STATES,
+    STILL,
+    STRUCK,
+    TOUCHING,
+    WANTED,
+    WORKED,
+)
+from multiphi_exudyn.events.law.impact import RESTING, collide, fill_rows
+from multiphi_exudyn.events.law.impact_round_off import speed_size, unseen_speed
+from multiphi_exudyn.events.states.signals import gap
+from multiphi_exudyn.events.states.state_arrays import copy_state, same_level
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
+from multiphi_exudyn.mathematics.complementarity.free_rows import product
+from multiphi_exudyn.mathematics.round_off import ZERO
+
+__all__ = ["BRIEF", "has_rebounded", "keep_landing", "lands", "last_bounce", "only_bounces", "push_on", "row_speed"]
+
+BRIEF = 1e-12  # of the time so far: a shorter bounce is the last
+
+
+@compiled
+def lands(ints: Ints, state: int, element: int) -> int:
+    """1 where an open contact comes down from its last bounce."""
+    level = ints[state + LEVEL]
+    if ints[ints[level + STATES] + element] != OPEN:
+        return 0
+    return 1 if ints[ints[state + PHASES] + ints[ints[level + FIRST_EXITS] + element]] == LANDING else 0
+
+
+@compiled
+def row_speed(ints: Ints, numbers: Numbers, state: int, k: int) -> float:
+    """Gap velocity of one of those that touch, zero where it is round-off; their rows have been filled."""
+    n = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS]
+    row = ints[ROWS] + k * n
+    speed = product(numbers, row, ints[state + SPEED], n)
+    return 0.0 if abs(speed) <= RESTING * speed_size(ints, numbers, state, row) else speed
+
+
+@compiled
+def push_on(ints: Ints, numbers: Numbers, count: int) -> int:
+    """STRUCK becomes the state after one more impact, to the speeds WANTED; OK or FAILED."""
+    touching, further = ints[TOUCHING], ints[FURTHER]
+    if collide(ints, numbers, STRUCK, touching, count, 0, ints[WANTED], -1, STILL, further, LOST_IN_IMPACT) < 0:
+        return FAILED
+    copy_state(ints, numbers, STILL, STRUCK)
+    for k in range(count):
+        numbers[ints[IMPULSES] + k] += numbers[further + k]
+    return OK
+
+
+@compiled
+def has_rebounded(ints: Ints, numbers: Numbers, k: int) -> int:
+    """1 where one of those that touch has been struck, and rebounds."""
+    contact = ints[ints[TOUCHING] + k]
+    rebounds = numbers[ints[RESTITUTIONS] + contact] > 0.0 and lands(ints, WORKED, contact) == 0
+    return 1 if rebounds and numbers[ints[IMPULSES] + k] > 0.0 else 0
+
+
+@compiled
+def last_bounce(ints: Ints, numbers: Numbers, count: int) -> int:
+    """11. How many leave their stops for the last time, after an impact: a bounce is too low to be seen, or too short.
+
+    It becomes as long as all that would follow. xi'' of STRUCK stands in the accelerations. Or FAILED.
+    """
+    level, last = ints[STRUCK + LEVEL], 0
+    n = ints[level + MODES] + ints[CHANNELS]
+    fill_rows(ints, numbers, level, ints[TOUCHING], count, 0)
+    for k in range(count):
+        contact, row, wanted = ints[ints[TOUCHING] + k], ints[ROWS] + k * n, ints[WANTED] + k
+        restitution, speed = numbers[ints[RESTITUTIONS] + contact], row_speed(ints, numbers, STRUCK, k)
+        ends = has_rebounded(ints, numbers, k) == 1 and restitution < 1.0 and ints[ints[LASTS] + contact] == 0
+        numbers[wanted] = 0.0
+        falling = -product(numbers, row, ints[ACCELERATION], n)
+        unseen = max(unseen_speed(ints, numbers, STRUCK, contact, row), 0.5 * BRIEF * numbers[INSTANT_TIME] * falling)
+        if ends and 0.0 < speed <= unseen:
+            numbers[wanted] = speed / (1.0 - restitution)
+            ints[ints[LASTS] + contact] = 1
+            last += 1
+    return last if last == 0 or push_on(ints, numbers, count) == OK else FAILED
+
+
+@compiled
+def only_bounces(ints: Ints, numbers: Numbers) -> int:
+    """1 where at an instant contacts of restitution below 1 have rebounded, and nothing else has changed."""
+    for k in range(ints[CHANGE_COUNT]):
+        restitution = numbers[ints[RESTITUTIONS] + ints[ints[CHANGES] + k * CHANGE_WIDTH]]
+        if not 0.0 < restitution < 1.0:
+            return 0
+    return 1 if ints[CHANGE_COUNT] > 0 and same_level(ints, REACHED, WORKED) == 1 else 0
+
+
+@compiled
+def keep_landing(ints: Ints, numbers: Numbers) -> None:
+    """11. Phases of WORKED: contacts on their last bounce, since this instant or before it without a blow since.
+
+    Who has been struck was at its stop: a gap that is the round-off of the instant, at its speed, is armed.
+    """
+    level, armed = ints[WORKED + LEVEL], 1
+    n = ints[level + MODES] + ints[CHANNELS]
+    for i in range(ints[ELEMENTS]):
+        if ints[ints[KINDS] + i] == RIGID and ints[ints[level + STATES] + i] == OPEN:
+            struck = 0
+            for k in range(ints[FIRST_CHANGE], ints[CHANGE_COUNT]):
+                if ints[ints[CHANGES] + k * CHANGE_WIDTH] == i and numbers[ints[CHANGE_IMPULSES] + k] != 0.0:
+                    struck = 1
+            phase = ints[WORKED + PHASES] + ints[ints[level + FIRST_EXITS] + i]
+            speed = product(numbers, ints[level + SPEEDS] + i * (n + 1), ints[WORKED + SPEED], n)
+            blurred = ZERO * numbers[INSTANT_TIME] * speed
+            if struck == 1 and ints[phase] == RECOVERING and -gap(ints, numbers, WORKED, i) <= blurred:
+                ints[phase] = ARMED
+            last = ints[ints[LASTS] + i] == 1 or (struck == 0 and lands(ints, REACHED, i) == 1)
+            if last and ints[phase] == ARMED:
+                ints[phase] = LANDING
+    for k in range(ints[level + EXIT_COUNT]):
+        armed = armed if ints[ints[WORKED + PHASES] + k] == ARMED else 0
+    ints[WORKED + SETTLED] = armed

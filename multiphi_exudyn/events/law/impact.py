@@ -1,0 +1,273 @@
+"""Impact in flat arrays: rigid contacts strike, or their motion presses them to their stops.
+
+    v+ = v- + A^T p,   p >= least,  A v+ >= wanted, complementary,   A = H^T Phi_l     (Moreau; without restitution: 0)
+
+A contact with friction has a second row, along h_t - v_t, and an impulse along it within mu times its first one.
+
+Where others hang on the structure an impulse A^T p gives it B A^T p, B = F F^T the mobility that they leave it:
+
+    v+ = v- + F z,   z = argmin |z|,  A F z >= wanted - A v-
+
+Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM 302 (1988).
+"""
+
+from __future__ import annotations
+
+import math
+
+from multiphi_exudyn.events.arrays import (
+    BY_IMPACT,
+    CAUSE,
+    CAUSED_BY,
+    CHANGE,
+    CHANNELS,
+    CLOSE,
+    ELEMENTS,
+    ENTERS,
+    FAILED,
+    FRICTIONS,
+    HELD_LINKS,
+    HIGHEST,
+    LEADERS,
+    LEVEL,
+    LOWEST,
+    MOBILITY,
+    MODES,
+    MOVED,
+    OK,
+    PLACE,
+    PUSHING,
+    RATIOS,
+    REACH,
+    ROWS,
+    SMALL_PROBLEM,
+    SPEED,
+    SPEEDS,
+    SQUEEZED,
+    STATIC_FRICTIONS,
+    STOP_WORK,
+    UNSETTLED,
+    VALUE_SIZES,
+    VALUES,
+)
+from multiphi_exudyn.events.law.impact_round_off import speed_size
+from multiphi_exudyn.events.states.energies import kinetic
+from multiphi_exudyn.events.states.state_arrays import copy_state, measure
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
+from multiphi_exudyn.mathematics.complementarity.free_rows import EXCLUDED_ROWS, EXCLUDING, norm, product
+from multiphi_exudyn.mathematics.complementarity.principal_pivoting import EXCLUDED, UNDECIDED, pose, solve
+from multiphi_exudyn.mathematics.round_off import ZERO
+
+__all__ = ["IMMOVABLE", "RESTING", "collide", "fill_rows", "nearest", "rub"]
+
+RESTING = 1e-12  # of what it could be at such speeds: a gap velocity below it is zero right after an impact
+IMMOVABLE = 1e-11  # of a contact's mobility: below it what hangs on the structure holds the contact
+
+
+@compiled
+def fill_rows(ints: Ints, numbers: Numbers, level: int, contacts: int, count: int, held: int) -> None:
+    """Gap velocities (count + held, n) from xi', of the last ``held`` contacts with the opposite sign."""
+    n = ints[level + MODES] + ints[CHANNELS]
+    for k in range(count + held):
+        sign = 1.0 if k < count else -1.0
+        row, own = ints[ROWS] + k * n, ints[level + SPEEDS] + ints[contacts + k] * (n + 1)
+        for i in range(n):
+            numbers[row + i] = sign * numbers[own + i]
+
+
+@compiled
+def rub(ints: Ints, numbers: Numbers, state: int, contacts: int, count: int, first: int, released: int) -> int:
+    """10. How many rows there are with those, after ``first`` ones, along which contacts (count,) rub.
+
+    An impulse along such a row is led by that of its contact. released: -1, or the state before an impact, where it is
+    forces at rest that are asked for: who slides after it then has no row, but pushes with its friction as well.
+    """
+    level, rows, pushing, mu = ints[state + LEVEL], first, ints[PUSHING], ints[FRICTIONS]
+    n = ints[level + MODES] + ints[CHANNELS]
+    for i in range(first * n if pushing != ints[ROWS] else 0):
+        numbers[pushing + i] = numbers[ints[ROWS] + i]
+    for k in range(count):
+        contact, slips = ints[contacts + k], 0
+        along = ints[level + SPEEDS] + ints[ints[HELD_LINKS] + contact] * (n + 1)
+        ints[ints[ENTERS] + contact] = CLOSE
+        if numbers[ints[STATIC_FRICTIONS] + contact] == 0.0:
+            continue
+        if released >= 0:
+            slips = slip_sign(ints, numbers, state, released, along)
+        if slips != 0:
+            ints[ints[ENTERS] + contact] = CLOSE + 1 if slips > 0 else CLOSE + 2
+            for i in range(n):
+                numbers[pushing + k * n + i] -= slips * numbers[mu + contact] * numbers[along + i]
+            continue
+        for i in range(n):
+            numbers[ints[ROWS] + rows * n + i] = numbers[along + i]
+            numbers[pushing + rows * n + i] = numbers[along + i]
+        ints[ints[LEADERS] + rows] = k
+        numbers[ints[RATIOS] + rows] = numbers[(mu if released < 0 else ints[STATIC_FRICTIONS]) + contact]
+        rows += 1
+    return rows
+
+
+@compiled
+def slip_sign(ints: Ints, numbers: Numbers, state: int, released: int, row: int) -> int:
+    """Sign of the speed along a row after an impact, zero where it is round-off of what it could be."""
+    n, size = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], speed_size(ints, numbers, state, row)
+    speed = product(numbers, row, ints[state + SPEED], n)
+    if abs(speed) <= RESTING * (size + speed_size(ints, numbers, released, row)):
+        return 0
+    return 1 if speed > 0.0 else -1
+
+
+@compiled
+def nearest(
+    ints: Ints,
+    numbers: Numbers,
+    level: int,
+    contacts: int,
+    count: int,
+    rows: int,
+    vector: int,
+    sizes: int,
+    wanted: int,
+    least: int,
+    multipliers: int,
+) -> int:
+    """The change (r,) that makes ``vector`` (n,) admissible, rows v >= wanted, its multipliers (rows,); OK or FAILED.
+
+    sizes: (rows,) of the terms of rows v beside those of v itself, -1 for none. wanted: (count,), -1 for zero. least:
+    (count,) of the contacts' multipliers, -1 for zero. The first ``count`` rows are those of the contacts, the others
+    of their friction.
+    """
+    r = ints[level + MODES]
+    n = r + ints[CHANNELS]
+    for k in range(rows):
+        row, value, terms = ints[ROWS] + k * n, 0.0, 0.0
+        for i in range(n):
+            value += numbers[row + i] * numbers[vector + i]
+            terms += abs(numbers[row + i]) * abs(numbers[vector + i])
+        for j in range(count if least >= 0 else 0):
+            pushed = numbers[least + j] * product(numbers, row, ints[ROWS] + j * n, r)
+            value += pushed
+            terms += abs(pushed)
+        rubs = 0.0
+        if least >= 0 and k >= count:
+            rubs = numbers[ints[RATIOS] + k] * numbers[least + ints[ints[LEADERS] + k]]
+        numbers[ints[VALUES] + k] = value - numbers[wanted + k] if wanted >= 0 and k < count else value
+        numbers[ints[VALUE_SIZES] + k] = terms + (numbers[sizes + k] if sizes >= 0 else 0.0)
+        numbers[ints[LOWEST] + k] = -rubs
+        numbers[ints[HIGHEST] + k] = math.inf if k < count else rubs
+        ints[ints[LEADERS] + k] = -1 if k < count else ints[ints[LEADERS] + k]
+    if ints[level + MOBILITY] >= 0:
+        limit_rows(ints, numbers, level, count)
+    problem = ints[SMALL_PROBLEM]
+    pose(
+        ints, problem, rows, r, n, ints[ROWS], ints[PUSHING], ints[VALUES], ints[VALUE_SIZES], ints[LOWEST],
+        ints[HIGHEST], ints[LEADERS], ints[RATIOS], ints[CHANGE], multipliers,
+    )  # fmt: skip
+    answer = solve(ints, numbers, problem, 0)
+    if answer == EXCLUDED:
+        ints[CAUSE] = SQUEEZED
+        for i in range(ints[ELEMENTS]):
+            ints[ints[CAUSED_BY] + i] = 0
+        for k in range(ints[problem + EXCLUDING]):
+            row = ints[ints[problem + EXCLUDED_ROWS] + k]
+            ints[ints[CAUSED_BY] + ints[contacts + (row if row < count else ints[ints[LEADERS] + row])]] = 1
+        return FAILED
+    if answer == UNDECIDED:
+        ints[CAUSE] = UNSETTLED
+        return FAILED
+    for j in range(count if least >= 0 else 0):
+        numbers[multipliers + j] += numbers[least + j]
+        for i in range(r):
+            numbers[ints[CHANGE] + i] += numbers[least + j] * numbers[ints[ROWS] + j * n + i]
+    if ints[level + MOBILITY] >= 0:
+        limit_change(ints, numbers, level)
+    return OK
+
+
+@compiled
+def limit_rows(ints: Ints, numbers: Numbers, level: int, count: int) -> None:
+    """Rows (count, r) become rows F; of a contact that cannot move for what hangs on the structure nothing is asked."""
+    r, moved = ints[level + MODES], ints[CHANGE]
+    n = r + ints[CHANNELS]
+    for k in range(count):
+        row, before, left = ints[ROWS] + k * n, norm(numbers, ints[ROWS] + k * n, r), 0.0
+        for j in range(r):
+            numbers[moved + j] = 0.0
+            for i in range(r):
+                numbers[moved + j] += numbers[row + i] * numbers[ints[level + MOBILITY] + i * r + j]
+        left = norm(numbers, moved, r)
+        held = left * left <= IMMOVABLE * before * before
+        for j in range(r):
+            numbers[row + j] = 0.0 if held else numbers[moved + j]
+        if held:
+            numbers[ints[VALUES] + k] = 0.0
+
+
+@compiled
+def limit_change(ints: Ints, numbers: Numbers, level: int) -> None:
+    """The change z (r,) becomes F z."""
+    r, given = ints[level + MODES], ints[MOVED]
+    for i in range(r):
+        numbers[given + i] = numbers[ints[CHANGE] + i]
+    for i in range(r):
+        numbers[ints[CHANGE] + i] = 0.0
+        for j in range(r):
+            numbers[ints[CHANGE] + i] += numbers[ints[level + MOBILITY] + i * r + j] * numbers[given + j]
+
+
+@compiled
+def collide(
+    ints: Ints,
+    numbers: Numbers,
+    state: int,
+    contacts: int,
+    count: int,
+    held: int,
+    wanted: int,
+    least: int,
+    result: int,
+    impulses: int,
+    losses: int,
+) -> int:
+    """2. The state after Moreau's impact, in a level in which the contacts are open; adds its losses; OK or FAILED.
+
+    held: the last so many contacts keep no speed away from their stop either. wanted: gap velocities (count + held,)
+    that they are to have at least, -1 for zero. least: impulses that they have at least, the same. impulses: (count +
+    held,) [N s], those of friction behind them.
+    What is left of a speed that the impact has taken away but for round-off would bounce and rock on until it
+    underflows, and what is left of a place where it has come to rest would swing, and strike again: both become zero.
+    """
+    level = ints[state + LEVEL]
+    r, channels = ints[level + MODES], ints[CHANNELS]
+    n, both, plastic = r + channels, count + held, 0.0
+    fill_rows(ints, numbers, level, contacts, count, held)
+    rows = rub(ints, numbers, state, contacts, count if held == 0 else 0, both, -1)
+    if nearest(ints, numbers, level, contacts, both, rows, ints[state + SPEED], -1, wanted, least, impulses) < 0:
+        return FAILED
+    for k in range(rows if least >= 0 else 0):
+        numbers[ints[VALUES] + k] = product(numbers, ints[ROWS] + k * n, ints[state + SPEED], n)
+    for k in range(both if least < 0 else 0):
+        plastic -= 0.5 * numbers[impulses + k] * numbers[ints[VALUES] + k]
+        if wanted >= 0:
+            plastic -= numbers[impulses + k] * numbers[wanted + k]
+    copy_state(ints, numbers, state, result)
+    v, before, x, reach = ints[result + SPEED], ints[state + SPEED], ints[result + PLACE], ints[state + REACH]
+    for i in range(r):
+        numbers[v + i] += numbers[ints[CHANGE] + i]
+    for k in range(both if least < 0 else 0, rows):
+        after = product(numbers, ints[ROWS] + k * n, v, n)
+        plastic -= 0.5 * numbers[impulses + k] * (numbers[ints[VALUES] + k] + after)
+    rest = norm(numbers, v, r) <= RESTING * norm(numbers, before, r)
+    for i in range(r):
+        if rest or abs(numbers[v + i]) <= RESTING * abs(numbers[before + i]):
+            numbers[v + i] = 0.0
+            if abs(numbers[x + i]) <= ZERO * numbers[reach + i]:
+                numbers[x + i] = 0.0
+    measure(ints, numbers, result)
+    lost = kinetic(ints, numbers, state) - kinetic(ints, numbers, result)
+    if channels == 0:
+        plastic = lost
+    numbers[losses + BY_IMPACT] += plastic
+    numbers[losses + STOP_WORK] += plastic - lost
+    return OK

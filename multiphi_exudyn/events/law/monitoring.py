@@ -1,0 +1,177 @@
+"""Waiting: for which signals a motion waits, and who asks when they fall, by sentences 1, 5 and 6 of the law.
+
+The first descent of a signal, of its opposite or of its rate through zero (zero_crossing.py) makes an exit ask, or
+arms it.
+"""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    ACCELERATION,
+    AGAIN,
+    ARMED,
+    ASKED,
+    ASKING,
+    CHANNELS,
+    CONSTANTS,
+    CURRENT,
+    ELEMENT,
+    ELEMENTS,
+    EXIT_COUNT,
+    EXIT_INTS,
+    EXITS,
+    FALLEN,
+    FLOW_BASIS,
+    FLOW_COUNT,
+    LANDING,
+    LEVEL,
+    MODES,
+    NOISES,
+    PHASES,
+    PLACE,
+    RATED,
+    REACH,
+    REACHED,
+    RECOVERING,
+    REFUSED,
+    ROW,
+    SETTLED,
+    SIGNAL,
+    SIGNALS,
+    SPEED,
+    SWING,
+    UNMOVED,
+    WAITING,
+    WORK_WAVES,
+)
+from multiphi_exudyn.events.law.changes import NOBODY
+from multiphi_exudyn.events.law.phases import entered_signal
+from multiphi_exudyn.events.states.flow import signal_waves
+from multiphi_exudyn.events.states.signals import held_part, mapped_terms
+from multiphi_exudyn.events.states.state_arrays import accelerate
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.response.basis_arrays import differentiate
+from multiphi_exudyn.mathematics.round_off import CLEAR, ZERO
+from multiphi_exudyn.mathematics.search.zero_crossing import simultaneous
+
+__all__ = ["arm", "flag_again", "watch", "who_asks"]
+
+
+@compiled
+def watch(ints: Ints, numbers: Numbers, waves: Waves) -> int:
+    """1, 5, 6. Signals whose first descent is next, of the flow from CURRENT; how many, or NEED.
+
+    Of each the exit, and whether that then asks or is armed, in WAITING. The phases are those of REACHED.
+    """
+    level, phases, count = ints[CURRENT + LEVEL], ints[REACHED + PHASES], 0
+    for k in range(ints[level + EXIT_COUNT]):
+        exit_, phase = ints[level + EXITS] + k * EXIT_INTS, ints[phases + k]
+        if ints[ints[UNMOVED] + ints[exit_ + ELEMENT]] == 1:
+            continue
+        if phase in (ARMED, LANDING):
+            count = wait_for(ints, numbers, waves, count, k, 0, 1.0, 0, 1)
+            continue
+        count = wait_for(ints, numbers, waves, count, k, 0, -1.0, 0, 0)
+        if phase == RECOVERING:
+            count = wait_for(ints, numbers, waves, count, k, 0, 1.0, 1, 1)
+        if phase == REFUSED:
+            signal = entered_signal(ints, level, exit_)
+            if signal < 0:
+                return signal
+            count = wait_for(ints, numbers, waves, count, k, signal, -1.0, 0, 1)
+    return count
+
+
+@compiled
+def wait_for(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    count: int,
+    exit_number: int,
+    entered: int,
+    sign: float,
+    rate: int,
+    asks: int,
+) -> int:
+    """List the signal of an exit, or the one ``entered``, times ``sign``, or its rate; count + 1.
+
+    What begins below zero by round-off, a reaction by that of the transition before, begins at zero: so it was judged.
+    """
+    level = ints[CURRENT + LEVEL]
+    signal = entered if entered > 0 else ints[level + EXITS] + exit_number * EXIT_INTS + SIGNAL
+    n, p, row = ints[level + MODES] + ints[CHANNELS], ints[FLOW_COUNT], ints[signal + ROW]
+    x, v, scale, first = ints[CURRENT + PLACE], ints[CURRENT + SPEED], ints[CURRENT + REACH], ints[SIGNALS] + count * p
+    signal_waves(ints, numbers, waves, CURRENT, signal, first)
+    constant, size = numbers[row + 2 * n], abs(numbers[row + 2 * n])
+    constant = sign * (constant + held_part(ints, numbers, CURRENT, signal))
+    if rate == 1:
+        differentiate(ints, numbers, waves, ints[FLOW_BASIS], first, first)
+        x, v, scale, constant, size = v, ints[ACCELERATION], ints[CURRENT + SWING], 0.0, 0.0
+    begins = sign * numbers[row + 2 * n]
+    for i in range(n):
+        size += abs(numbers[row + i]) * (abs(numbers[x + i]) + numbers[scale + i])
+        begins += sign * (numbers[row + i] * numbers[x + i])
+    if ints[signal + RATED] == 1:
+        swing = ints[CURRENT + SWING]
+        if rate == 1:
+            accelerate(ints, numbers, CURRENT, v)
+        for i in range(n):
+            size += abs(numbers[row + n + i]) * (abs(numbers[v + i]) + (numbers[swing + i] if rate == 0 else 0.0))
+            begins += sign * (numbers[row + n + i] * numbers[v + i])
+    if rate == 0 and entered == 0 and begins < 0.0:
+        terms = mapped_terms(ints, numbers, CURRENT, ints[level + EXITS] + exit_number * EXIT_INTS)
+        constant -= begins if abs(begins) <= ZERO * (size + terms) else 0.0
+    if sign < 0.0:
+        for j in range(p):
+            waves[first + j] = -waves[first + j]
+    numbers[ints[CONSTANTS] + count] = constant
+    numbers[ints[NOISES] + count] = CLEAR * size
+    ints[ints[WAITING] + 2 * count] = exit_number
+    ints[ints[WAITING] + 2 * count + 1] = asks
+    return count + 1
+
+
+@compiled
+def who_asks(ints: Ints, numbers: Numbers, waves: Waves, count: int, found: int, reached: float) -> int:
+    """1. ASKING: of the elements whose signals fall at an instant those that then ask; how many."""
+    level, flags, waiting, asking = ints[CURRENT + LEVEL], ints[FALLEN], ints[WAITING], 0
+    for i in range(ints[ELEMENTS]):
+        ints[ints[ASKING] + i] = NOBODY
+    if ints[level + EXIT_COUNT] > 1:
+        simultaneous(
+            ints, numbers, waves, ints[FLOW_BASIS], ints[SIGNALS], ints[CONSTANTS], count, found, reached,
+            ints[WORK_WAVES], flags,
+        )  # fmt: skip
+    else:  # one contact's signals exclude each other
+        for s in range(count):
+            ints[flags + s] = 1 if s == found else 0
+    for s in range(count):
+        if ints[flags + s] == 1 and ints[waiting + 2 * s + 1] == 1:
+            exit_ = ints[level + EXITS] + ints[waiting + 2 * s] * EXIT_INTS
+            ints[ints[ASKING] + ints[exit_ + ELEMENT]] = ints[exit_ + ASKED]
+            asking += 1
+    return asking
+
+
+@compiled
+def arm(ints: Ints, exit_number: int) -> None:
+    """An exit of the state REACHED is armed."""
+    phases, settled = ints[REACHED + PHASES], 1
+    ints[phases + exit_number] = ARMED
+    for k in range(ints[ints[REACHED + LEVEL] + EXIT_COUNT]):
+        if ints[phases + k] != ARMED:
+            settled = 0
+    ints[REACHED + SETTLED] = settled
+
+
+@compiled
+def flag_again(ints: Ints, at_once: int) -> None:
+    """6. AGAIN: who asks at the instant at which it was refused before."""
+    phases, exits = ints[REACHED + PHASES], ints[ints[REACHED + LEVEL] + EXITS]
+    for i in range(ints[ELEMENTS]):
+        ints[ints[AGAIN] + i] = 0
+    for k in range(ints[ints[REACHED + LEVEL] + EXIT_COUNT]):
+        element = ints[exits + k * EXIT_INTS + ELEMENT]
+        if at_once == 1 and ints[ints[ASKING] + element] != NOBODY and ints[phases + k] == REFUSED:
+            ints[ints[AGAIN] + element] = 1

@@ -1,0 +1,205 @@
+"""Phases: how every exit of a state stands, by sentences 1, 5 and 6 of the law (decision.py).
+
+An exit is ARMED, RECOVERING, REFUSED or HELD_BACK. s is its signal.
+"""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    AGAIN,
+    ARMED,
+    ASKED,
+    CHANNELS,
+    ELEMENT,
+    ENTERED,
+    EXIT_COUNT,
+    EXIT_INTS,
+    EXITS,
+    FIRMNESS,
+    FIRST_EXITS,
+    FLOW_BASIS,
+    FLOW_COUNT,
+    HEARD,
+    HELD_BACK,
+    KINDS,
+    LEVEL,
+    MODES,
+    NEED,
+    NEED_ENTERED,
+    NEEDED,
+    NEEDED_FROM,
+    NEEDED_KEY,
+    OPEN,
+    PHASES,
+    REACHED,
+    RECOVERING,
+    REFUSED,
+    RIGID,
+    ROW,
+    SEARCH_NUMBERS,
+    SEARCH_WAVES,
+    SETTLED,
+    SIGNAL,
+    STATES,
+    UNMOVED,
+    WORK_WAVES,
+    WORKED,
+)
+from multiphi_exudyn.events.states.flow import expand, signal_sizes, signal_waves
+from multiphi_exudyn.events.states.signals import held_part, mapped_terms, rate_sign, row_sign
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.search.zero_crossing import first_sign
+from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, MAY_RECOVER, TAKEN_ONCE
+
+__all__ = [
+    "becomes",
+    "entered_signal",
+    "first_exit",
+    "hold_back",
+    "is_denied",
+    "is_pulled",
+    "is_refused",
+    "keep_entered",
+    "opening",
+    "phase_of",
+    "update_phases",
+]
+
+
+@compiled
+def phase_of(ints: Ints, numbers: Numbers, waves: Waves, state: int, exit_: int) -> int:
+    """1, 5. ARMED where s is or becomes positive, RECOVERING where it is negative and may rise, else REFUSED."""
+    signal = exit_ + SIGNAL
+    value = row_sign(ints, numbers, state, signal, mapped_terms(ints, numbers, state, exit_))
+    if value > 0:
+        return ARMED
+    rate = rate_sign(ints, numbers, state, signal)
+    if rate == 0:
+        rate = becomes(ints, numbers, waves, state, signal, 2)
+    if value == 0 and rate >= 0:
+        return ARMED
+    recovers = ints[exit_ + FIRMNESS] == MAY_RECOVER or ints[exit_ + FIRMNESS] >= TAKEN_ONCE
+    return RECOVERING if rate > 0 and recovers else REFUSED
+
+
+@compiled
+def becomes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal: int, since: int) -> int:
+    """9. Sign of a signal's first derivative, of order ``since`` or higher, that is not round-off."""
+    n = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS]
+    expand(ints, numbers, waves, state)
+    signal_waves(ints, numbers, waves, state, signal, ints[WORK_WAVES])
+    signal_sizes(ints, numbers, waves, state, signal, ints[SEARCH_NUMBERS])
+    constant = numbers[ints[signal + ROW] + 2 * n] + held_part(ints, numbers, state, signal)
+    basis = ints[FLOW_BASIS]
+    return first_sign(
+        ints, numbers, waves, basis, ints[WORK_WAVES], constant, ints[SEARCH_NUMBERS], since,
+        ints[SEARCH_NUMBERS] + ints[FLOW_COUNT], ints[SEARCH_WAVES],
+    )  # fmt: skip
+
+
+@compiled
+def update_phases(ints: Ints, numbers: Numbers, waves: Waves, state: int, refused: int) -> None:
+    """6. The phase in which every exit of a state stands; refused: flags of those that asked in vain, -1 for none."""
+    level, phases = ints[state + LEVEL], ints[state + PHASES]
+    count, exits, settled = ints[level + EXIT_COUNT], ints[level + EXITS], 1
+    for k in range(count):
+        exit_, ints[phases + k] = exits + k * EXIT_INTS, ARMED
+        if ints[ints[UNMOVED] + ints[exit_ + ELEMENT]] == 0:
+            ints[phases + k] = phase_of(ints, numbers, waves, state, exit_)
+        if ints[phases + k] != ARMED:
+            settled = 0
+    if refused >= 0:
+        for k in range(count):
+            if ints[refused + ints[exits + k * EXIT_INTS + ELEMENT]] == 1 and ints[phases + k] != ARMED:
+                ints[phases + k] = REFUSED
+    ints[state + SETTLED] = settled
+
+
+@compiled
+def is_denied(ints: Ints, state: int, element: int) -> int:
+    """4, 10. 1 where an exit of an element is refused but for those that are always taken: they follow at once."""
+    level = ints[state + LEVEL]
+    first = ints[level + FIRST_EXITS] + element
+    for k in range(ints[first], ints[first + 1]):
+        firm = ints[ints[level + EXITS] + k * EXIT_INTS + FIRMNESS] >= ALWAYS_TAKEN
+        if ints[ints[state + PHASES] + k] == REFUSED and not firm:
+            return 1
+    return 0
+
+
+@compiled
+def is_refused(ints: Ints, state: int, element: int) -> int:
+    """1 where an exit of an element is refused."""
+    first = ints[ints[state + LEVEL] + FIRST_EXITS] + element
+    for k in range(ints[first], ints[first + 1]):
+        if ints[ints[state + PHASES] + k] == REFUSED:
+            return 1
+    return 0
+
+
+@compiled
+def is_pulled(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> int:
+    """3. 1 where a rigid contact would be pulled if a state went on as it is."""
+    level = ints[state + LEVEL]
+    for k in range(ints[level + EXIT_COUNT]):
+        exit_ = ints[level + EXITS] + k * EXIT_INTS
+        opens = ints[exit_ + ASKED] == OPEN and ints[ints[KINDS] + ints[exit_ + ELEMENT]] == RIGID
+        if opens and phase_of(ints, numbers, waves, state, exit_) == REFUSED:
+            return 1
+    return 0
+
+
+@compiled
+def hold_back(ints: Ints, state: int) -> None:
+    """6. Those that were refused at this instant before, and are once more, wait until s has risen to zero."""
+    level = ints[state + LEVEL]
+    for k in range(ints[level + EXIT_COUNT]):
+        element = ints[ints[level + EXITS] + k * EXIT_INTS + ELEMENT]
+        if ints[ints[AGAIN] + element] == 1 and ints[ints[state + PHASES] + k] == REFUSED:
+            ints[ints[state + PHASES] + k] = HELD_BACK
+            ints[state + SETTLED] = 0
+
+
+@compiled
+def keep_entered(ints: Ints, numbers: Numbers) -> None:
+    """An exit that is always taken is armed where it leads back to where the instant began, and its signal is zero.
+
+    The signal that brought the element here was zero too: what either says beyond that is round-off. A rigid contact
+    that is left without reaction opens nevertheless, and so does what others have brought here.
+    """
+    level, before = ints[WORKED + LEVEL], ints[ints[REACHED + LEVEL] + STATES]
+    for k in range(ints[level + EXIT_COUNT]):
+        exit_ = ints[level + EXITS] + k * EXIT_INTS
+        element, phase = ints[exit_ + ELEMENT], ints[WORKED + PHASES] + k
+        back = ints[exit_ + FIRMNESS] >= ALWAYS_TAKEN and ints[exit_ + ASKED] == ints[before + element]
+        pulls = ints[ints[KINDS] + element] == RIGID and ints[exit_ + ASKED] == OPEN
+        back = back and ints[phase] == REFUSED and not pulls
+        back = back and ints[ints[HEARD] + element] == 1
+        if back and row_sign(ints, numbers, WORKED, exit_ + SIGNAL, 0.0) == 0:
+            ints[phase] = ARMED
+
+
+@compiled
+def first_exit(ints: Ints, level: int, element: int) -> int:
+    """The first exit of an element in a level."""
+    return ints[level + EXITS] + ints[ints[level + FIRST_EXITS] + element] * EXIT_INTS
+
+
+@compiled
+def opening(ints: Ints, level: int, element: int) -> int:
+    """The exit of a closed contact by which it opens."""
+    k = ints[ints[level + FIRST_EXITS] + element]
+    while ints[ints[level + EXITS] + k * EXIT_INTS + ASKED] != OPEN:
+        k += 1
+    return ints[level + EXITS] + k * EXIT_INTS
+
+
+@compiled
+def entered_signal(ints: Ints, level: int, exit_: int) -> int:
+    """The signal that an exit's element would have in the level entered alone; or NEED."""
+    if ints[exit_ + ENTERED] < 0:
+        ints[NEEDED] = NEED_ENTERED
+        ints[NEEDED_FROM] = level
+        ints[ints[NEEDED_KEY]] = (exit_ - ints[level + EXITS]) // EXIT_INTS
+        return NEED
+    return ints[exit_ + ENTERED]

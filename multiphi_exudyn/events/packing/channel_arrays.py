@@ -1,0 +1,101 @@
+"""The channels of a run, q >= 0, in buffers (arrays.py): their values at an instant, and records of their pieces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.arrays import Buffers
+from multiphi_exudyn.events.excitation.excitation import Drive
+from multiphi_exudyn.events.excitation.pieces import Pieces
+from multiphi_exudyn.events.states import channel_values
+from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
+
+__all__ = ["ChannelArrays"]
+
+PIECES_AT_ONCE = 1024  # packed when the loop comes to the end of those it knows
+
+
+class ChannelArrays:
+    """The channels of ``levels`` in buffers; terms: the largest number of coefficients of a channel's piece.
+
+    carriers: the same of each carrier by its rate, of the pieces packed so far.
+    """
+
+    def __init__(self, levels: LoadedLevels) -> None:
+        self._excitation, self._until = levels.excitation, levels.until
+        self._pieces = Pieces(levels.excitation.histories, levels.drive.time, levels.until)
+        self.terms = max((history.coefficients.shape[1] for history in levels.excitation.histories), default=0)
+        self.carriers: dict[complex, int] = {}
+
+    def describe(self, buffers: Buffers) -> None:
+        """How many there are, and memory for their values, in new buffers."""
+        q, ints = self._excitation.prescribed, buffers.ints
+        ints[a.CHANNELS], ints[a.PRESCRIBED] = self._excitation.channels, q
+        given = {a.DRIVE: buffers.take("numbers", 6 * q), a.SCALED_TERM: buffers.take("waves", self.terms * q)}
+        for slot in (a.DRIVE_WAVES, a.DRIVE_NEXT):
+            given[slot] = buffers.take("waves", q * self.terms * q)
+        for slot, value in given.items():
+            ints[slot] = value
+        self.reserve(buffers)
+
+    def reserve(self, buffers: Buffers) -> None:
+        """Records of the pieces that follow."""
+        if not self._excitation.prescribed:
+            return
+        put, first, all_ = buffers.put, int(buffers.ints[a.PIECE_COUNT]), self._pieces
+        if first == 0:
+            table = buffers.take("ints", len(all_))
+            buffers.ints[a.PIECES] = table
+        last = min(first + PIECES_AT_ONCE, len(all_))
+        times = put("numbers", np.column_stack([all_.starts, all_.ends])[first:last])
+        for places, terms in all_.terms(first, last):
+            for rates, given in terms:
+                for rate in np.unique(rates).tolist():
+                    self.carriers[rate] = max(self.carriers.get(rate, 0), given.shape[1])
+            k, parts = len(places), [np.column_stack([rates, given.reshape(len(given), -1)]) for rates, given in terms]
+            waves = np.hstack(parts)
+            starts = np.cumsum([0, *(part.shape[1] for part in parts)])[:-1] + np.arange(k)[:, None] * waves.shape[1]
+            records = np.empty((k, a.TERM_INTS + 2 * len(terms)), np.int64)
+            records[:, a.PIECE_TIMES], records[:, a.PIECE_TERMS] = times + 2 * (places - first), len(terms)
+            records[:, a.TERM_INTS :: 2] = [given.shape[1] for _, given in terms]
+            records[:, a.TERM_INTS + 1 :: 2] = put("waves", waves) + starts
+            at = put("ints", records) + np.arange(k) * records.shape[1]
+            buffers.ints[buffers.ints[a.PIECES] + places] = at
+        buffers.ints[a.PIECE_COUNT] = last
+
+    def reserve_until(self, buffers: Buffers, piece: int) -> None:
+        """Records of the pieces up to one."""
+        while self._excitation.prescribed and buffers.ints[a.PIECE_COUNT] <= piece:
+            self.reserve(buffers)
+
+    @property
+    def first_end(self) -> float:
+        """When [s] the first piece of the channels ends, as far as it is asked for."""
+        return min(self._until, float(self._pieces.ends[0])) if self._excitation.prescribed else self._until
+
+    def drive(self, piece: int) -> Drive:
+        """The channels from the beginning of a piece on."""
+        return self._excitation.drive(float(self._pieces.starts[piece]))
+
+    def at(self, buffers: Buffers, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Set the channels to a time [s]: w, w' (q,) there of those that are functions of time."""
+        if not self._excitation.prescribed:
+            self.set(buffers, 0, time - float(self._pieces.starts[0]), time)
+            return np.zeros(0), np.zeros(0)
+        piece = max(int(np.searchsorted(self._pieces.starts, time, side="right")) - 1, 0)
+        self.set(buffers, piece, time - float(self._pieces.starts[piece]), time)
+        q, place = int(buffers.ints[a.PRESCRIBED]), int(buffers.ints[a.DRIVE])
+        return buffers.numbers[place : place + q].copy(), buffers.numbers[place + q : place + 2 * q].copy()
+
+    def set(self, buffers: Buffers, piece: int, age: float, time: float) -> None:
+        """The channels a time ``age`` [s] after the beginning of a piece, for the scales of the first state."""
+        ints, numbers = buffers.ints, buffers.numbers
+        ints[a.PIECE], numbers[a.AGE], numbers[a.HORIZON] = piece, age, 1.0
+        if not self._excitation.prescribed:
+            return
+        self.reserve_until(buffers, piece)
+        channel_values.load_piece(buffers.ints, buffers.waves)
+        until = min(self._until, float(self._pieces.ends[piece]))
+        channel_values.set_drive(*buffers.all, int(buffers.ints[a.DRIVE_NEXT]), age, time, until)
+        channel_values.keep_drive(buffers.ints, buffers.waves)

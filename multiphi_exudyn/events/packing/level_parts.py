@@ -1,0 +1,103 @@
+"""What describes a level's motion, gaps, energies and powers, and those of the base, as arrays (arrays.py).
+
+All of it is in the coordinates xi = (eta, w) of a loaded level, with q >= 0 channels.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.excitation.excitation import Excitation
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.levels.modal_base import ModalBase
+
+__all__ = ["base_parts", "from_base", "level_parts", "powers"]
+
+
+def level_parts(level: LoadedLevel) -> dict[int, np.ndarray]:
+    """Motion, gaps and energies of a level."""
+    own, modal, channels, form = level.level, level.modal, level.channels, level.potential_form
+    stiffness, drive = -modal.coupling, level.asymptotic.drive[:, None]
+    stiffness.flat[:: modal.modes + 1] -= modal.squares
+    motion = [stiffness, channels.force, -modal.damping_matrix, channels.force_rate, drive]
+    parts = {
+        a.MOTION: np.concatenate(motion, axis=1),
+        a.GAPS: np.concatenate([own.gap_rows, level.gap_constants[:, None]], axis=1),
+        a.POTENTIAL: np.concatenate([[form.constant], form.linear, form.squares, form.rows.ravel()]),
+        a.FOLLOWS: form.follows,
+    }
+    if level.excitation.channels:
+        moved, patterns = channels.carried.T, level.excitation.patterns.T
+        parts[a.PATTERNS] = np.column_stack([patterns @ own.vectors, patterns @ level.asymptotic.configuration])
+        if np.any(moved):
+            parts[a.CARRIED] = np.hstack([moved @ modal.vectors, moved @ channels.carried])
+    if own is not modal:
+        parts[a.SPEEDS] = np.column_stack([own.speed_rows, np.zeros(len(own.gap_rows))])
+    return parts
+
+
+def base_parts(base: ModalBase, excitation: Excitation) -> dict[int, np.ndarray]:
+    """Gaps and energies of the base, all contacts open, in (y, w)."""
+    q, patterns = excitation.channels, excitation.patterns.T
+    rows = np.column_stack([patterns, np.zeros((q, q))])
+    linear = [-base.preload - excitation.static, np.zeros(q)]
+    return {
+        a.GAPS: np.column_stack([base.directions.T, -excitation.stops, base.gaps]),
+        a.POTENTIAL: np.concatenate([[base.energy_offset], *linear, base.modes.omega**2, -rows.ravel()]),
+        a.PATTERNS: np.column_stack([rows, np.zeros(q)]),
+    }
+
+
+def from_base(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The map (T, c, T') from the base to a level; sizes (r, q + 1) of the terms that channels and rest give a mode."""
+    vectors, channels, rest = level.modal.vectors.T, level.channels, level.asymptotic.configuration
+    (r, m), q = vectors.shape, channels.carried.shape[1]
+    place, speed = np.eye(r + q, m + q, m - r), np.eye(r + q, m + q, m - r)
+    for matrix, moved in ((place, channels.shapes), (speed, channels.carried)):
+        matrix[:r, :m], matrix[:r, m:] = vectors, -(vectors @ moved)
+    sizes = np.abs(vectors) @ np.abs(np.column_stack([channels.shapes, rest]))
+    return place, np.concatenate([-(vectors @ rest), np.zeros(q)]), speed, sizes
+
+
+def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The power of damping as a form in xi' (n, n), of what varies (q, 4 n + 1), of friction (n,), as in work.py.
+
+    And of friction that goes with other forces (s, 4 n + 1): T, the speed on which it works, that of its constant part,
+    and this. Without channels only the first and the third are not empty.
+    """
+    own, base, index, carried = level.level, level.level.base, list(level.level.indices), level.channels.carried
+    modal, patterns = level.modal, level.excitation.patterns
+    friction = -(level.pushes @ own.gap_rows) if base.general else np.zeros(own.modes)
+    if not level.excitation.channels:
+        empty = np.zeros((0, 4 * own.modes + 1))
+        return modal.damping, empty, friction, empty
+    static = level.excitation.static + base.preload
+    moved = np.hstack([modal.vectors, carried])
+    springs = base.springs[index]
+    pulls, drags = springs[:, None] * own.gap_rows[index], base.dampings[index][:, None] * own.speed_rows[index]
+    held = springs * level.gap_constants[index]
+    given = carried.T @ base.pushes - level.excitation.stops.T  # by the forces of elements
+    worked = given[:, index]
+    placed = worked @ pulls + carried.T @ (base.modes.omega[:, None] ** 2 * own.vectors)
+    placed[:, modal.modes :] -= carried.T @ patterns
+    speed = worked @ drags + carried.T @ base.damping @ moved
+    constant = worked @ held + carried.T @ (base.modes.omega**2 * level.asymptotic.configuration - static)
+    constant -= given @ level.pushes
+    slides = [k for k, link in enumerate(index) if link in base.oblique and np.isinf(base.stiffnesses[link])]
+    placed -= worked[:, slides] @ own.force_rows[slides]
+    speed -= worked[:, slides] @ own.force_rate_rows[slides]
+    constant -= worked[:, slides] @ level.asymptotic.forces[slides]
+    pairs = []
+    for i in level.rubbing_elements:
+        held = next(k for k in base.link_places[i] if base.links[k].held)
+        (place, rate, still), moves = level.rubbing(i), level.excitation.stops[held]
+        pairs.append(np.concatenate([place, rate, own.speed_rows[held], own.gap_rows[held], [still]]))
+        placed -= np.outer(moves, place)
+        speed -= np.outer(moves, rate)
+        constant -= still * moves
+    damping = moved.T @ base.damping @ moved + own.speed_rows[index].T @ drags
+    damping[: modal.modes, : modal.modes] = modal.damping  # given ratios count
+    varying = np.column_stack([patterns.T @ own.vectors, placed, speed, carried.T @ moved, constant])
+    rubbing = np.array(pairs).reshape(-1, 4 * own.modes + 1)
+    return damping, varying, friction, rubbing

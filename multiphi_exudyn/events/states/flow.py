@@ -1,0 +1,330 @@
+"""Flow in flat arrays: the motion from a state, as long as one piece of every channel lasts.
+
+    xi(t) = Re V (c phi(t)) + Re sum_j exp(mu_j t) sum_k x_jk (t/T)^k
+
+xi = (eta, w); phi the p exponentials of the free response, x (n,) its response to the channels' pieces and these
+themselves, T the horizon, a power of two. What is made of a state stands in the scratch memory of the flow: its basis,
+the coefficients c of its exponentials (one for each x), of which terms they are the sums, and the x.
+"""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    CHANNELS,
+    FLOW_BASIS,
+    FLOW_COUNT,
+    FLOW_FORCED,
+    FLOW_FREE,
+    FLOW_FROM,
+    FLOW_RECORD,
+    FLOW_STATE,
+    FLOW_TERMS,
+    FLOW_WAVES,
+    FORCE,
+    FORCED,
+    FORCED_ROOM,
+    FORCED_WANTED,
+    FORCED_WORK,
+    FORCES,
+    FREE_SIZES,
+    HORIZON,
+    LEVEL,
+    MAPPED,
+    MODES,
+    MOTION,
+    PIECE_NOW,
+    PIECE_TERMS,
+    PLACE,
+    PRESCRIBED,
+    RATED,
+    RESPONSE,
+    ROW,
+    SCALED_TERM,
+    SPEED,
+    TERM_INTS,
+    TERMS_NOW,
+    WAVE,
+    WORK_WAVES,
+)
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.response.basis_arrays import (
+    POWERS,
+    PURE,
+    RATES,
+    SCALES,
+    SIZE,
+    describe_basis,
+    differentiate,
+    exponentials,
+)
+from multiphi_exudyn.mathematics.response.response_arrays import (
+    FREE,
+    FROM_DISPLACEMENT,
+    REACHED,
+    SHAPES,
+    coefficients_of,
+    forced_response,
+)
+
+__all__ = ["expand", "signal_sizes", "signal_waves", "state_at", "step_on"]
+
+
+@compiled
+def expand(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
+    """Fill in the flow from a state."""
+    level, c, x, v = ints[state + LEVEL], ints[FLOW_WAVES], ints[state + PLACE], ints[state + SPEED]
+    response, force = ints[level + RESPONSE], ints[level + FORCE]
+    p = ints[ints[response + FREE] + SIZE]
+    ints[FLOW_FROM] = state
+    ints[FLOW_FREE], ints[FLOW_COUNT], ints[FLOW_BASIS] = p, p, ints[response + FREE]
+    if ints[PRESCRIBED] > 0:
+        r = ints[level + MODES]
+        force_flow(ints, numbers, waves, state)
+        x, v = ints[FLOW_STATE], ints[FLOW_STATE] + r
+    coefficients_of(ints, numbers, waves, response, x, v, force, c)
+    for j in range(p if ints[ints[response + FREE] + PURE] == 0 else 0):
+        waves[c + j] *= unit_of_flow(ints, numbers, ints[response + FREE], j)
+
+
+@compiled
+def unit_of_flow(ints: Ints, numbers: Numbers, basis: int, j: int) -> float:
+    """By what a coefficient on the basis of the free response is multiplied for that of the flow."""
+    ratio, unit = numbers[ints[ints[FLOW_BASIS] + SCALES]] / numbers[ints[basis + SCALES]], 1.0
+    for _ in range(ints[ints[basis + POWERS] + j]):
+        unit *= ratio
+    return unit
+
+
+@compiled
+def force_flow(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
+    """The response to the channels' terms, with these, as x_k of the flow, and its basis.
+
+    Left in the memory of the flow: what of eta and eta' at the start is not forced (2, r). Where there is no room for
+    as many powers as a response takes, FORCED_WANTED says for how many.
+    """
+    level, q, horizon = ints[state + LEVEL], ints[PRESCRIBED], numbers[HORIZON]
+    r, free, given, moved = ints[level + MODES], ints[FLOW_FREE], ints[PIECE_NOW], ints[TERMS_NOW]
+    own, record, most = ints[FLOW_STATE], ints[FLOW_RECORD], ints[FORCED_ROOM]
+    basis = ints[FLOW_BASIS]
+    for i in range(r):
+        numbers[own + i] = numbers[ints[state + PLACE] + i]
+        numbers[own + r + i] = numbers[ints[state + SPEED] + i]
+    count, powers = free, 0
+    for term in range(ints[given + PIECE_TERMS]):
+        degree, carrier = ints[given + TERM_INTS + 2 * term] - 1, ints[given + TERM_INTS + 2 * term + 1]
+        force_modes(ints, numbers, waves, level, carrier, moved, degree)
+        rows = forced_response(
+            ints, numbers, waves, ints[level + RESPONSE], carrier, ints[FORCES], degree, horizon,
+            ints[state + PLACE], ints[state + SPEED], most, ints[FORCED_WORK], ints[FORCED],
+        )  # fmt: skip
+        if rows > most:
+            ints[FORCED_WANTED] = max(ints[FORCED_WANTED], rows)
+            rows = most
+        powers = max(powers, max(rows, degree + 1) - 1)
+        add_forced(ints, numbers, waves, level, carrier, degree, rows, count)
+        count += max(rows, degree + 1)
+        moved += (degree + 1) * q
+    for j in range(free):
+        ints[ints[record + POWERS] + j] = ints[ints[basis + POWERS] + j]
+        waves[ints[record + RATES] + j] = waves[ints[basis + RATES] + j]
+    ints[record + SIZE] = count
+    numbers[ints[record + SCALES]] = horizon if powers > 0 else numbers[ints[basis + SCALES]]
+    describe_basis(ints, numbers, waves, record)
+    ints[FLOW_COUNT], ints[FLOW_BASIS] = count, record
+
+
+@compiled
+def force_modes(ints: Ints, numbers: Numbers, waves: Waves, level: int, carrier: int, moved: int, degree: int) -> None:
+    """A term in powers of t / T, and its modal forces P w + Q w' (degree + 1, r)."""
+    r, q, horizon, rate = ints[level + MODES], ints[PRESCRIBED], numbers[HORIZON], waves[carrier]
+    n, scale, scaled = r + ints[CHANNELS], 1.0, ints[SCALED_TERM]
+    for d in range(degree + 1):
+        for k in range(q):
+            waves[scaled + d * q + k] = waves[moved + d * q + k] * scale
+        scale *= horizon
+    for d in range(degree + 1):
+        forces = ints[FORCES] + d * r
+        for i in range(r):
+            waves[forces + i] = 0j
+        for k in range(q):
+            row, value = ints[level + MOTION] + r + k, waves[scaled + d * q + k]
+            slope = rate * value
+            if d < degree:
+                slope += (d + 1) / horizon * waves[scaled + (d + 1) * q + k]
+            for i in range(r):
+                waves[forces + i] += numbers[row] * value + numbers[row + n] * slope
+                row += 2 * n + 1
+
+
+@compiled
+def add_forced(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    level: int,
+    carrier: int,
+    degree: int,
+    rows: int,
+    count: int,
+) -> None:
+    """List the response (rows, r) to a term, and the term itself, behind ``count`` exponentials."""
+    r, q, record, own = ints[level + MODES], ints[PRESCRIBED], ints[FLOW_RECORD], ints[FLOW_STATE]
+    n, rate = r + q, waves[carrier]
+    for k in range(max(rows, degree + 1)):
+        j = count + k
+        x = ints[FLOW_FORCED] + (j - ints[FLOW_FREE]) * n
+        for i in range(r):
+            waves[x + i] = waves[ints[FORCED] + k * r + i] if k < rows else 0j
+        for i in range(q):
+            waves[x + r + i] = waves[ints[SCALED_TERM] + k * q + i] if k <= degree else 0j
+        ints[ints[record + POWERS] + j] = k
+        waves[ints[record + RATES] + j] = rate
+        waves[ints[FLOW_WAVES] + j] = 1.0 + 0j
+    for i in range(r):
+        value = waves[ints[FORCED] + i]
+        slope = rate * value
+        if rows > 1:
+            slope += 1.0 / numbers[HORIZON] * waves[ints[FORCED] + r + i]
+        numbers[own + i] -= value.real
+        numbers[own + r + i] -= slope.real
+
+
+@compiled
+def size_terms(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
+    """Of which terms (p,) the coefficients of the flow from a state are the sums.
+
+    The transition that has made the state counts: a stiff mode that hardly moves has the round-off of those it is
+    made of, and accelerates with it.
+    """
+    for j in range(ints[FLOW_COUNT]):
+        numbers[ints[FLOW_TERMS] + j] = abs(waves[ints[FLOW_WAVES] + j])
+    if ints[PRESCRIBED] > 0:
+        size_driven_terms(ints, numbers, state)
+    response, r = ints[ints[state + LEVEL] + RESPONSE], ints[ints[state + LEVEL] + MODES]
+    for j in range(ints[FLOW_FREE]):
+        reached, size = ints[response + REACHED] + 2 * j, 0.0
+        for i in range(ints[reached], ints[reached + 1]):
+            displaced = waves[ints[response + FROM_DISPLACEMENT] + j * r + i]
+            size += abs(displaced) * numbers[ints[state + MAPPED] + i]
+        numbers[ints[FLOW_TERMS] + j] += size * unit_of_flow(ints, numbers, ints[response + FREE], j)
+
+
+@compiled
+def size_driven_terms(ints: Ints, numbers: Numbers, state: int) -> None:
+    """The same of the free response beside channels: what is forced may be larger than the motion."""
+    level, own, x, v = ints[state + LEVEL], ints[FLOW_STATE], ints[state + PLACE], ints[state + SPEED]
+    response, force, p, r = ints[level + RESPONSE], ints[level + FORCE], ints[FLOW_FREE], ints[level + MODES]
+    for j in range(p):
+        size, row = 0.0, ints[level + FREE_SIZES] + j * r
+        for i in range(ints[ints[response + REACHED] + 2 * j], ints[ints[response + REACHED] + 2 * j + 1]):
+            place, speed = numbers[own + i], numbers[own + r + i]
+            size += numbers[row + i] * (abs(place) + abs(numbers[x + i] - place))
+            size += numbers[row + p * r + i] * (abs(speed) + abs(numbers[v + i] - speed))
+            if force >= 0:
+                size += numbers[row + 2 * p * r + i] * abs(numbers[force + i])
+        numbers[ints[FLOW_TERMS] + j] = size * unit_of_flow(ints, numbers, ints[response + FREE], j)
+
+
+@compiled
+def signal_waves(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal: int, result: int) -> None:
+    """Coefficients (p,) of a signal on the flow from a state, without its constant."""
+    n, row, c = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW], ints[FLOW_WAVES]
+    moving = n - ints[CHANNELS] + ints[PRESCRIBED]
+    free, count, rate = ints[FLOW_FREE], ints[FLOW_COUNT], ints[WORK_WAVES] + ints[FLOW_COUNT]
+    rated = ints[signal + RATED] == 1
+    for j in range(free):
+        waves[result + j] = waves[ints[signal + WAVE] + j] * waves[c + j]
+        waves[rate + j] = waves[ints[signal + WAVE] + free + j] * waves[c + j] if rated else 0j
+    for j in range(free, count):
+        forced = ints[FLOW_FORCED] + (j - free) * moving
+        value = 0j
+        slope = 0j
+        for i in range(moving):
+            value += numbers[row + i] * waves[forced + i]
+            slope += numbers[row + n + i] * waves[forced + i]
+        waves[result + j] = value
+        waves[rate + j] = slope
+    if rated:
+        differentiate(ints, numbers, waves, ints[FLOW_BASIS], rate, rate)
+        for j in range(count):
+            waves[result + j] += waves[rate + j]
+
+
+@compiled
+def signal_sizes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal: int, result: int) -> None:
+    """Of which terms (p,) the coefficients of a signal are the sums.
+
+    |row.V| |c| + |row'.V| |c| |lambda|, and of a power d > 0 its derivative d / T at the one before.
+    """
+    n, row, basis = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW], ints[FLOW_BASIS]
+    moving = n - ints[CHANNELS] + ints[PRESCRIBED]
+    free, count, unit = ints[FLOW_FREE], ints[FLOW_COUNT], numbers[ints[ints[FLOW_BASIS] + SCALES]]
+    rated = ints[signal + RATED] == 1
+    size_terms(ints, numbers, waves, state)
+    for j in range(count):
+        value = 0.0
+        slope = 0.0
+        if j < free:
+            value = abs(waves[ints[signal + WAVE] + j])
+            slope = abs(waves[ints[signal + WAVE] + free + j]) if rated else 0.0
+        else:
+            forced = ints[FLOW_FORCED] + (j - free) * moving
+            whole = 0j
+            changed = 0j
+            for i in range(moving):
+                whole += numbers[row + i] * waves[forced + i]
+                changed += numbers[row + n + i] * waves[forced + i]
+            value, slope = abs(whole), abs(changed)
+        terms = numbers[ints[FLOW_TERMS] + j]
+        numbers[result + j] = value * terms
+        if rated:
+            numbers[result + j] += slope * terms * abs(waves[ints[basis + RATES] + j])
+            if ints[ints[basis + POWERS] + j] > 0:
+                numbers[result + j - 1] += ints[ints[basis + POWERS] + j] / unit * slope * terms
+
+
+@compiled
+def state_at(ints: Ints, numbers: Numbers, waves: Waves, level: int, t: float, x: int, v: int) -> None:
+    """xi, xi' of the flow a time t after its state; held channels stay what they are."""
+    basis, phi = ints[FLOW_BASIS], ints[WORK_WAVES]
+    exponentials(ints, numbers, waves, basis, t, t, phi)
+    differentiate(ints, numbers, waves, basis, ints[FLOW_WAVES], phi + ints[FLOW_COUNT])
+    sum_flow(ints, numbers, waves, level, x, v)
+
+
+@compiled
+def step_on(ints: Ints, numbers: Numbers, waves: Waves, level: int, step: float, again: int, x: int, v: int) -> None:
+    """``state_at`` a step [s] after the time that was asked about last, ``again`` 1 where that was one step on too.
+
+    Of a flow without powers of time the exponentials are multiplied by those of the step.
+    """
+    basis, phi, p = ints[FLOW_BASIS], ints[WORK_WAVES], ints[FLOW_COUNT]
+    if again == 0:
+        exponentials(ints, numbers, waves, basis, step, step, phi + 2 * p)
+    for j in range(p):
+        waves[phi + j] *= waves[phi + 2 * p + j]
+    sum_flow(ints, numbers, waves, level, x, v)
+
+
+@compiled
+def sum_flow(ints: Ints, numbers: Numbers, waves: Waves, level: int, x: int, v: int) -> None:
+    """xi, xi' from the exponentials at a time, and the coefficients of their derivatives."""
+    r, basis, response = ints[level + MODES], ints[FLOW_BASIS], ints[level + RESPONSE]
+    n, free, count, c = r + ints[PRESCRIBED], ints[FLOW_FREE], ints[FLOW_COUNT], ints[FLOW_WAVES]
+    phi, rate = ints[WORK_WAVES], ints[WORK_WAVES] + ints[FLOW_COUNT]
+    for i in range(r + ints[CHANNELS]):
+        numbers[x + i] = 0.0 if i < n else numbers[ints[ints[FLOW_FROM] + PLACE] + i]
+        numbers[v + i] = 0.0
+    for j in range(count):
+        value, slope = waves[c + j] * waves[phi + j], waves[rate + j] * waves[phi + j]
+        first, end, row = 0, n, ints[FLOW_FORCED] + (j - free) * n
+        if j < free:
+            first, end = ints[ints[response + REACHED] + 2 * j], ints[ints[response + REACHED] + 2 * j + 1]
+            row = ints[response + SHAPES] + j * r
+        else:  # every power has an x of its own
+            slope = waves[ints[basis + RATES] + j] * value
+            if ints[ints[basis + POWERS] + j] > 0:
+                slope += ints[ints[basis + POWERS] + j] / numbers[ints[basis + SCALES]] * waves[phi + j - 1]
+        for i in range(first, end):
+            numbers[x + i] += (waves[row + i] * value).real
+            numbers[v + i] += (waves[row + i] * slope).real

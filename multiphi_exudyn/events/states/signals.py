@@ -1,0 +1,126 @@
+"""Signals of a state, and gaps: s = row . (xi, xi', 1), and its sign.
+
+A sum is judged by the sizes of its own terms (round_off.py), to which the scales of the state belong (state_arrays.py).
+"""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    ACCELERATION,
+    ACCELERATION_TERMS,
+    CHANNELS,
+    FIRMNESS,
+    GAPS,
+    LEVEL,
+    MAPPED,
+    MODES,
+    PLACE,
+    PRESCRIBED,
+    RATED,
+    REACH,
+    ROW,
+    SIGNAL,
+    SPEED,
+    SWING,
+)
+from multiphi_exudyn.events.states.state_arrays import accelerate, acceleration_sizes
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
+from multiphi_exudyn.mathematics.round_off import ZERO
+from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN
+
+__all__ = ["gap", "held_part", "mapped_terms", "rate_sign", "row_sign", "sign_of"]
+
+
+@compiled
+def sign_of(value: float, size: float) -> int:
+    """Sign of a sum, zero where it is round-off of its terms, which add up to ``size`` without their signs."""
+    if abs(value) <= ZERO * size:
+        return 0
+    return 1 if value > 0.0 else -1
+
+
+@compiled
+def row_sign(ints: Ints, numbers: Numbers, state: int, signal: int, terms: float) -> int:
+    """9. Sign of a signal, zero where it is round-off of its terms.
+
+    At the root of a signal all displacements, or velocities, may be round-off of what they were before: |eta'| / omega
+    and omega |eta| count too. terms: what else the signal is a sum of.
+    """
+    n, row = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW]
+    x, v, reach, swing = ints[state + PLACE], ints[state + SPEED], ints[state + REACH], ints[state + SWING]
+    rated, value = ints[signal + RATED] == 1, numbers[row + 2 * n]
+    size = abs(value) + terms
+    for i in range(n):
+        term = numbers[row + i] * numbers[x + i]
+        size += abs(numbers[row + i]) * numbers[reach + i]
+        if rated:
+            term += numbers[row + n + i] * numbers[v + i]
+            size += abs(numbers[row + n + i]) * numbers[swing + i]
+        value += term
+        size += abs(term)
+    return sign_of(value, size)
+
+
+@compiled
+def mapped_terms(ints: Ints, numbers: Numbers, state: int, exit_: int) -> float:
+    """Of which terms the transition that has made a state has made an exit's signal, where it is a reaction, else zero.
+
+    The displacements of two levels may be large where what presses on a contact is small; a gap is the same in both.
+    """
+    if ints[exit_ + FIRMNESS] != ALWAYS_TAKEN:
+        return 0.0
+    row, mapped, total = ints[exit_ + SIGNAL + ROW], ints[state + MAPPED], 0.0
+    for i in range(ints[ints[state + LEVEL] + MODES]):
+        total += abs(numbers[row + i]) * numbers[mapped + i]
+    return total
+
+
+@compiled
+def rate_sign(ints: Ints, numbers: Numbers, state: int, signal: int) -> int:
+    """9. Sign of a signal's time derivative, zero where it is round-off of its terms.
+
+    At a turning point all velocities may be round-off of what they were before: omega |eta| counts too. Of a signal
+    with a speed it is a sum of what the accelerations are sums of, which may cancel.
+    """
+    n, row = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW]
+    v, swing, accelerations, terms = (
+        ints[state + SPEED],
+        ints[state + SWING],
+        ints[ACCELERATION],
+        ints[ACCELERATION_TERMS],
+    )
+    rated = ints[signal + RATED] == 1
+    if rated:
+        accelerate(ints, numbers, state, accelerations)
+        acceleration_sizes(ints, numbers, state, terms)
+    value, size = 0.0, 0.0
+    for i in range(n):
+        term = numbers[row + i] * numbers[v + i]
+        size += abs(term) + abs(numbers[row + i]) * numbers[swing + i]
+        if rated:
+            term += numbers[row + n + i] * numbers[accelerations + i]
+            size += abs(numbers[row + n + i]) * numbers[terms + i]
+        value += term
+    return sign_of(value, size)
+
+
+@compiled
+def held_part(ints: Ints, numbers: Numbers, state: int, signal: int) -> float:
+    """What the held channels of a state add to a signal, until the next transition."""
+    held = ints[CHANNELS] - ints[PRESCRIBED]
+    first, total = ints[ints[state + LEVEL] + MODES] + ints[PRESCRIBED], 0.0
+    for k in range(first, first + held):
+        total += numbers[ints[signal + ROW] + k] * numbers[ints[state + PLACE] + k]
+    return total
+
+
+@compiled
+def gap(ints: Ints, numbers: Numbers, state: int, element: int) -> float:
+    """Gap of a contact [m]."""
+    level, x = ints[state + LEVEL], ints[state + PLACE]
+    n = ints[level + MODES] + ints[CHANNELS]
+    row = ints[level + GAPS] + element * (n + 1)
+    value = numbers[row + n]
+    for i in range(n):
+        value += numbers[row + i] * numbers[x + i]
+    return value

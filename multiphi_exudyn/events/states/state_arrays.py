@@ -1,0 +1,126 @@
+"""States in flat arrays (arrays.py): their copies, scales and accelerations.
+
+    eta'' = motion . (xi, xi', 1)                                                     (38.3)
+
+The scales of a state are how far its speeds carry the modes, |eta'| / omega, and how fast its displacements make them,
+omega |eta|: to them belongs the round-off of a motion. A state that a transition has made has the round-off of the
+terms of the map as well, at that instant.
+"""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    CHANNELS,
+    DRIVE,
+    EXIT_COUNT,
+    FREQUENCIES,
+    LEVEL,
+    MAPPED,
+    MODES,
+    MOTION,
+    PERIODS,
+    PHASES,
+    PLACE,
+    PRESCRIBED,
+    REACH,
+    SETTLED,
+    SPEED,
+    SWING,
+)
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
+from multiphi_exudyn.mathematics.round_off import ZERO
+
+__all__ = ["accelerate", "acceleration_sizes", "clear_turning_speeds", "copy_state", "measure", "same_level"]
+
+
+@compiled
+def copy_state(ints: Ints, numbers: Numbers, given: int, result: int) -> None:
+    """A copy of a state, phases included."""
+    ints[result + LEVEL] = ints[given + LEVEL]
+    ints[result + SETTLED] = ints[given + SETTLED]
+    x, v, x_copy, v_copy = ints[given + PLACE], ints[given + SPEED], ints[result + PLACE], ints[result + SPEED]
+    reach, mapped, swing = ints[given + REACH], ints[given + MAPPED], ints[given + SWING]
+    reach_copy, mapped_copy, swing_copy = ints[result + REACH], ints[result + MAPPED], ints[result + SWING]
+    for i in range(ints[ints[given + LEVEL] + MODES] + ints[CHANNELS]):
+        numbers[x_copy + i] = numbers[x + i]
+        numbers[v_copy + i] = numbers[v + i]
+        numbers[reach_copy + i] = numbers[reach + i]
+        numbers[mapped_copy + i] = numbers[mapped + i]
+        numbers[swing_copy + i] = numbers[swing + i]
+    for i in range(ints[ints[given + LEVEL] + EXIT_COUNT]):
+        ints[ints[result + PHASES] + i] = ints[ints[given + PHASES] + i]
+
+
+@compiled
+def same_level(ints: Ints, one: int, other: int) -> int:
+    """1 where two states are of the same level."""
+    return 1 if ints[one + LEVEL] == ints[other + LEVEL] else 0
+
+
+@compiled
+def measure(ints: Ints, numbers: Numbers, state: int) -> None:
+    """Scales of a state: |eta'| / omega and omega |eta|, for given channels the sizes of the terms of w and w'."""
+    level, x, v = ints[state + LEVEL], ints[state + PLACE], ints[state + SPEED]
+    r, q, reach, swing = ints[level + MODES], ints[PRESCRIBED], ints[state + REACH], ints[state + SWING]
+    for i in range(r):
+        numbers[reach + i] = abs(numbers[v + i]) * numbers[ints[level + PERIODS] + i]
+        numbers[swing + i] = abs(numbers[x + i]) * numbers[ints[level + FREQUENCIES] + i]
+    sizes = ints[DRIVE] + 3 * q
+    for i in range(r + ints[CHANNELS]):
+        numbers[ints[state + MAPPED] + i] = 0.0
+    for k in range(ints[CHANNELS]):
+        numbers[reach + r + k] = numbers[sizes + k] if k < q else 0.0
+        numbers[swing + r + k] = numbers[sizes + q + k] if k < q else 0.0
+
+
+@compiled
+def clear_turning_speeds(ints: Ints, numbers: Numbers, state: int) -> None:
+    """Modal speeds of a state become zero where they are round-off of what the displacement makes of them.
+
+    A mode at its turning point would strike with them, on one processor and not on another.
+    """
+    v, swing = ints[state + SPEED], ints[state + SWING]
+    for i in range(ints[ints[state + LEVEL] + MODES]):
+        if abs(numbers[v + i]) <= ZERO * numbers[swing + i]:
+            numbers[v + i] = 0.0
+
+
+@compiled
+def accelerate(ints: Ints, numbers: Numbers, state: int, result: int) -> None:
+    """xi'' (n,)."""
+    level, x, v = ints[state + LEVEL], ints[state + PLACE], ints[state + SPEED]
+    r, q = ints[level + MODES], ints[CHANNELS]
+    n = r + q
+    row = ints[level + MOTION]
+    for i in range(r):
+        total = numbers[row + 2 * n]
+        for j in range(n):
+            total += numbers[row + j] * numbers[x + j] + numbers[row + n + j] * numbers[v + j]
+        numbers[result + i] = total
+        row += 2 * n + 1
+    for k in range(q):
+        numbers[result + r + k] = numbers[ints[DRIVE] + 2 * ints[PRESCRIBED] + k] if k < ints[PRESCRIBED] else 0.0
+
+
+@compiled
+def acceleration_sizes(ints: Ints, numbers: Numbers, state: int, result: int) -> None:
+    """Of which terms (n,) the accelerations are the sums, and omega |eta'|, how large the velocities make them.
+
+    A displacement counts with the terms of the map that has made it.
+    """
+    level, x, v, mapped = ints[state + LEVEL], ints[state + PLACE], ints[state + SPEED], ints[state + MAPPED]
+    r, q, sizes = ints[level + MODES], ints[PRESCRIBED], ints[DRIVE] + 3 * ints[PRESCRIBED]
+    n = r + ints[CHANNELS]
+    row = ints[level + MOTION]
+    for i in range(r):
+        total = abs(numbers[row + 2 * n]) + numbers[ints[level + FREQUENCIES] + i] * abs(numbers[v + i])
+        for j in range(r):
+            total += abs(numbers[row + j]) * max(abs(numbers[x + j]), numbers[mapped + j])
+            total += abs(numbers[row + n + j] * numbers[v + j])
+        for k in range(q):
+            total += abs(numbers[row + r + k]) * numbers[sizes + k]
+            total += abs(numbers[row + n + r + k]) * numbers[sizes + q + k]
+        numbers[result + i] = total
+        row += 2 * n + 1
+    for k in range(n - r):
+        numbers[result + r + k] = numbers[sizes + 2 * q + k] if k < q else 0.0

@@ -1,0 +1,191 @@
+"""Functions on flat buffers, run as plain Python or compiled.
+
+A function marked ``compiled`` keeps its name for the plain function: called from Python it runs as Python, with NumPy
+arrays as buffers. ``entry(function)`` is the same function compiled, with all that it calls, at its first call; what is
+compiled is kept on disk, and loaded from there without numba. Where numba is missing, an entry is the plain function.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import importlib.util
+import sys
+import threading
+import warnings
+import weakref
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+from types import FunctionType, NoneType
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiWarning
+from multiphi_exudyn.mathematics.compiling.buffer_function import (
+    Ints,
+    Numbers,
+    Shorts,
+    Waves,
+    compiled,
+    digest,
+    reached,
+    signature,
+    symbol,
+)
+from multiphi_exudyn.mathematics.compiling.compiled_cache import cache_file, keep, kept, writable_folder
+
+__all__ = ["Entry", "Ints", "Numbers", "Shorts", "Waves", "available", "compile_entries", "compiled", "entry"]
+
+TYPES: dict[Any, np.dtype] = {
+    Ints: np.dtype(np.int64),
+    Shorts: np.dtype(np.int32),
+    Numbers: np.dtype(float),
+    Waves: np.dtype(complex),
+}
+SCALARS: dict[Any, Any] = {int: ctypes.c_int64, float: ctypes.c_double, NoneType: None}
+
+_one_at_a_time = threading.RLock()  # neither numba nor LLVM is meant for two threads
+_entries: list[Entry] = []
+
+
+def available() -> bool:
+    """Whether functions are compiled: numba is installed."""
+    return importlib.util.find_spec("numba") is not None
+
+
+def entry(function: Callable[..., Any]) -> Entry:
+    """``function`` to be called compiled, with contiguous NumPy arrays and scalars."""
+    assert isinstance(function, FunctionType)
+    _entries.append(Entry(function))
+    return _entries[-1]
+
+
+def compile_entries() -> Path | None:
+    """Compile all entries of the modules loaded so far; the file that keeps them, None if none could be written."""
+    for each in _entries:
+        each.native()
+    return cache_file()
+
+
+class Entry:
+    """A function that Python calls compiled. ``plain``: as Python, to which overflow is no warning either."""
+
+    def __init__(self, function: FunctionType) -> None:
+        self.function = function
+        self.plain: Callable[..., Any] = np.errstate(all="ignore")(function)
+        self._native: Callable[..., Any] | None = None
+        self._code: Any = None  # keeps the machine code where it is
+
+    def __call__(self, *arguments: Any) -> Any:
+        """What the function returns."""
+        try:
+            return (self._native or self.native())(*arguments)
+        except ctypes.ArgumentError as error:
+            raise MultiPhiTypeError(f"{self.function.__qualname__}: {error}") from error
+
+    def bound(self, *buffers: np.ndarray) -> Callable[..., Any]:
+        """The function with its first arguments fixed, at half the cost of a call; the caller keeps the buffers."""
+        native: Any = self.native()
+        if native is self.plain:
+            return functools.partial(native, *buffers)
+        arguments, result = signature(self.function)
+        kinds = [ctypes.c_void_p if kind in TYPES else SCALARS[kind] for kind in arguments]
+        address = ctypes.cast(native, ctypes.c_void_p).value or 0
+        given = [kind.from_param(buffer) for kind, buffer in zip(native.argtypes, buffers, strict=False)]
+        function: Any = ctypes.CFUNCTYPE(SCALARS[result], *kinds)(address)
+        function.entry = self  # which keeps the machine code
+        return functools.partial(function, *given)
+
+    def native(self) -> Callable[..., Any]:
+        """The function as ctypes calls it, made at the first call; ``plain`` without numba."""
+        with _one_at_a_time:
+            if self._native is None:
+                self._native = self._loaded() if available() else self.plain
+        return self._native
+
+    def _loaded(self) -> Callable[..., Any]:
+        try:
+            from multiphi_exudyn.mathematics.compiling.machine_code import load
+
+            address, self._code = load(_objects(reached(self.function)), symbol(self.function))
+        except ImportError as error:
+            warnings.warn(
+                f"numba is installed but cannot be imported ({error}): the loop runs as plain Python, 50 times slower",
+                MultiPhiWarning,
+                stacklevel=4,
+            )
+            return self.plain
+        arguments, result = signature(self.function)
+        native: Any = ctypes.CFUNCTYPE(SCALARS[result])(address)
+        native.argtypes = [_Buffer(TYPES[kind]) if kind in TYPES else SCALARS[kind] for kind in arguments]
+        return native
+
+
+def _objects(functions: Sequence[FunctionType]) -> list[bytes]:
+    """The object files of functions, from the disk or made anew."""
+    digests = _digests(functions)
+    objects = kept(digests)
+    if len(objects) < len(digests):
+        complete = _completed(functions)
+        objects = {name: complete[name] for name in digests}
+    return list(objects.values())
+
+
+def _completed(functions: Sequence[FunctionType]) -> dict[str, bytes]:
+    """The object files of all that functions and entries need; those that were not kept are compiled, and kept.
+
+    A run needs most of them, and many are shared out among processes better than a few.
+    """
+    needed = dict.fromkeys([*functions, *(each for one in _entries for each in reached(one.function))])
+    digests = _digests(needed)
+    known = kept(digests)
+    missing = [function for function in needed if symbol(function) not in known]
+    made = dict(zip(map(symbol, missing), _compile(missing), strict=True))
+    keep({name: (digests[name], code) for name, code in made.items()})
+    return known | made
+
+
+def _digests(functions: Collection[FunctionType]) -> dict[str, str]:
+    """Digests of functions by their symbols."""
+    digests = {symbol(function): digest(function) for function in functions}
+    assert len(digests) == len(functions), "two functions of one name"
+    return digests
+
+
+def _compile(functions: Sequence[FunctionType]) -> list[bytes]:
+    """The object files of functions, announced by a line on stderr."""
+    from multiphi_exudyn.mathematics.compiling.compilation import compile_functions, expected_seconds
+
+    often = "once on this machine" if writable_folder() else "in every process: no folder to keep it in is writable"
+    print(f"compiling the loop: about {expected_seconds(functions):.0f} s, {often}", file=sys.stderr)
+    return compile_functions(functions)
+
+
+class _Buffer:
+    """What a buffer is for ctypes: the address of its first number, remembered for the array asked about last.
+
+    That array may be deleted meanwhile, but not moved: NumPy enlarges no array in its place that somebody remembers.
+    """
+
+    def __init__(self, dtype: np.dtype) -> None:
+        self._dtype = dtype
+        self._last: tuple[Callable[[], Any], ctypes.c_void_p] = (lambda: self, ctypes.c_void_p())
+
+    def from_param(self, array: np.ndarray) -> ctypes.c_void_p:
+        """The address of an array."""
+        last, address = self._last
+        return address if last() is array else self._address(array)
+
+    def _address(self, array: np.ndarray) -> ctypes.c_void_p:
+        if not (isinstance(array, np.ndarray) and array.dtype == self._dtype and array.flags.carray):
+            got = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
+            raise MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}")
+        address = ctypes.c_void_p(_place(array))
+        self._last = (weakref.ref(array), address)
+        return address
+
+
+def _place(array: np.ndarray) -> int:
+    """Where the first number of an array stands, which NumPy itself takes longer to tell."""
+    return ctypes.addressof(ctypes.c_char.from_buffer(array.data)) if array.size else array.ctypes.data

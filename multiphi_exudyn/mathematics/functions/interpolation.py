@@ -1,0 +1,221 @@
+"""Interpolation: a function of time as polynomials on carriers, to a tolerance.
+
+    u(t) = Re( exp(i omega_i s) sum_d a_id s^d ),   s = t - t_i,   on the piece t_i <= t < t_i+1
+
+Pieces are interpolated at Chebyshev points of the second kind, their ends among them, and halved until the interpolant
+agrees with the function at the points midway between, and at samples of the whole interval that are spread unevenly,
+the multiples of the golden ratio: no periodic function hides from them. What is shorter than the gaps between the
+samples, 1.2 / number of them, may not be seen at all. A piece that stays in doubt is searched for a jump or a kink
+(corners.py), and the pieces are made again with that instant as an end.
+Source: L. N. Trefethen, Approximation Theory and Approximation Practice, 2013, ch. 2 and 16; V. T. Sos, On the
+distribution mod 1 of the sequence n alpha, Ann. Univ. Sci. Budapest 1 (1958) 127.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.polynomial.chebyshev as chebyshev
+
+from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.mathematics.functions.corners import INSTANT, corners_in, distinct
+
+__all__ = ["DEGREE", "FEW_SAMPLES", "MANY_SAMPLES", "MOST_PIECES", "Function", "Interpolant", "Samples", "interpolated"]
+
+DEGREE = 8  # of the polynomials that stand for smooth functions
+MOST_PIECES = 2**18  # a function that needs more is not smooth at the asked tolerance
+FIRST_PIECES = 64  # into which a function's interval is divided before any comparison
+ROUND_OFF = 1e-13  # of the largest value: no interpolant is asked to come closer
+SHORT = 2**-10  # of a first piece: one that is still in doubt may hold a corner
+MOST_CORNERS = 2**12  # looked for at once: where more pieces are in doubt, the function is not resolved yet
+IMPULSE = 1 / MOST_PIECES  # of tolerance times interval: in integral a piece may be off by that, all by no more than it
+PASSES = 8  # in which corners are looked for: in round-off there is always one more
+MANY_SAMPLES = 28657  # of a function that takes many times at once; Fibonacci numbers divide most evenly
+FEW_SAMPLES = 10946  # of one that takes single times, a microsecond or more each
+
+Function = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Samples:
+    """A function at ascending times (k,) of [0, end]."""
+
+    times: np.ndarray
+    values: np.ndarray
+
+    @classmethod
+    def of(cls, function: Function, end: float, count: int = MANY_SAMPLES) -> Samples:
+        """So many samples, spread over [0, end] as multiples of the golden ratio."""
+        times = end * np.sort(np.arange(0.5, count) * ((math.sqrt(5) - 1) / 2) % 1.0)
+        return cls(times, function(np.concatenate([times, [0.0, end]]))[:-2])  # at the ends a number is enough
+
+    @property
+    def largest(self) -> float:
+        """The largest |u|."""
+        return float(np.max(np.abs(self.values), initial=0.0))
+
+    def errors(self, lefts: np.ndarray, rights: np.ndarray, carriers: np.ndarray, series: np.ndarray) -> np.ndarray:
+        """Largest distance (n,) of the samples from the Chebyshev series of pieces, which do not overlap."""
+        order, errors = np.argsort(lefts), np.zeros(len(lefts))
+        owner = order[np.maximum(np.searchsorted(lefts[order], self.times, side="right") - 1, 0)]
+        inside = (self.times >= lefts[owner]) & (self.times < rights[owner])
+        owner, t = owner[inside], self.times[inside]
+        places = 2 * (t - lefts[owner]) / (rights[owner] - lefts[owner]) - 1
+        found = np.sum(chebyshev.chebvander(places, DEGREE) * series[owner], axis=1)
+        found = found * np.exp(1j * carriers[owner] * (t - lefts[owner]))
+        np.maximum.at(errors, owner, np.abs(found - self.values[inside]))
+        return errors
+
+
+@dataclass(frozen=True)
+class Interpolant:
+    """Pieces from edge to edge (n + 1,): carriers omega (n,), a (n, D + 1).
+
+    error: the largest, with that of pieces too short to matter spread over the interval.
+    """
+
+    edges: np.ndarray
+    carriers: np.ndarray
+    coefficients: np.ndarray
+    error: float
+
+
+def interpolated(
+    function: Function, omega: Function, end: float, tolerance: float, samples: Samples, breaks: np.ndarray
+) -> Interpolant:
+    """A function of (k,) times on [0, end] to ``tolerance``, in units of u, on pieces that ride on omega.
+
+    breaks: corners that are known. Raises NumericalFailure where no so many pieces are enough.
+    """
+    corners = distinct(breaks, end)
+    for searched in (*[True] * PASSES, False):
+        pieces = _Pieces(function, omega, end, tolerance, samples, corners, searched)
+        found = pieces.halved()
+        if not len(found):
+            break
+        corners = distinct(np.concatenate([corners, found]), end)
+    return pieces.interpolant()
+
+
+class _Pieces:
+    """Pieces on their way to a tolerance, between known corners."""
+
+    def __init__(
+        self,
+        function: Function,
+        omega: Function,
+        end: float,
+        tolerance: float,
+        samples: Samples,
+        corners: np.ndarray,
+        searched: bool,
+    ) -> None:
+        self._function, self._omega, self._end, self._tolerance = function, omega, end, tolerance
+        self._samples, self._corners, self._searched = samples, corners, searched
+        self._size, self._worst = samples.largest, 0.0
+        self._done: list[tuple[np.ndarray, ...]] = []
+        self._left = 0.0
+
+    def halved(self) -> np.ndarray:
+        """Halve pieces until they agree with the function; corners (k,) that were found on the way."""
+        edges = self._first_edges()
+        lefts, rights, count, found = edges[:-1], edges[1:], 0, list[np.ndarray]()
+        while len(lefts):
+            carriers = self._omega((lefts + rights) / 2)
+            series, errors = self._fit(lefts, rights, carriers)
+            close, impulses = errors <= self._allowed, errors * (rights - lefts)
+            good = close | (impulses <= IMPULSE * self._allowed * self._end)
+            self._worst = max(self._worst, float(np.max(errors[close], initial=0.0)))
+            self._left += float(np.sum(impulses[good & ~close]))
+            self._done.append(tuple(column[good] for column in (lefts, rights, carriers, series)))
+            count += int(np.sum(good))
+            lefts, rights = lefts[~good], rights[~good]
+            here = self._corners_in(lefts, rights)
+            found.append(here[np.isfinite(here)])
+            lefts, rights = lefts[np.isnan(here)], rights[np.isnan(here)]
+            if count + 2 * len(lefts) > MOST_PIECES or np.any(rights - lefts <= INSTANT * self._end):
+                raise NumericalFailure(
+                    f"function of time: not smooth enough for a tolerance of {self._tolerance:g} near t = "
+                    f"{lefts[0]:g} s (more than {MOST_PIECES} polynomials of degree {DEGREE}), need a larger "
+                    "tolerance, or breaks where it or its derivatives jump"
+                )
+            middles = (lefts + rights) / 2
+            lefts, rights = np.concatenate([lefts, middles]), np.concatenate([middles, rights])
+        return np.concatenate(found)
+
+    def interpolant(self) -> Interpolant:
+        """The pieces, once they agree."""
+        lefts, rights, carriers, series = (np.concatenate(parts) for parts in zip(*self._done, strict=True))
+        order = np.argsort(lefts)
+        widths = (rights - lefts)[order, None]
+        scaled = series[order] @ _power_matrix() / widths ** np.arange(DEGREE + 1)
+        edges = np.append(lefts[order], self._end)
+        error = max(self._worst, ROUND_OFF * self._size) + self._left / self._end
+        return Interpolant(edges, carriers[order], scaled, error)
+
+    @property
+    def _allowed(self) -> float:
+        return max(self._tolerance, ROUND_OFF * self._size)
+
+    def _first_edges(self) -> np.ndarray:
+        even = np.arange(FIRST_PIECES + 1) * (self._end / FIRST_PIECES)
+        if not len(self._corners):
+            return even
+        apart = np.min(np.abs(even[:, None] - self._corners), axis=1) > 2 * INSTANT * self._end
+        return np.union1d(even[apart], self._corners)
+
+    def _corners_in(self, lefts: np.ndarray, rights: np.ndarray) -> np.ndarray:
+        """Corners of the pieces that are short enough to be searched for one, NaN elsewhere."""
+        result = np.full(len(lefts), np.nan)
+        short = np.flatnonzero(rights - lefts <= SHORT * self._end / FIRST_PIECES)
+        if self._searched and 0 < len(short) <= MOST_CORNERS:
+            here = corners_in(self._function, lefts[short], rights[short], self._end, self._allowed)
+            known = np.concatenate([[0.0], self._corners, [self._end]])
+            apart = np.min(np.abs(here[:, None] - known), axis=1) > 2 * INSTANT * self._end
+            result[short] = np.where(apart, here, np.nan)
+        return result
+
+    def _fit(self, lefts: np.ndarray, rights: np.ndarray, carriers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Chebyshev series (n, D + 1) of every piece on its carrier, its error (n,) midway and at the samples."""
+        own, between, fitted, midway = _nodes()
+        values, checks = (self._sampled(lefts, rights, carriers, places) for places in (own, between))
+        self._size = max(self._size, float(np.max(np.abs(values))))
+        series = (values @ fitted.T).astype(complex)
+        errors = np.max(np.abs(series @ midway.T - checks), axis=1)
+        return series, np.maximum(errors, self._samples.errors(lefts, rights, carriers, series))
+
+    def _sampled(self, lefts: np.ndarray, rights: np.ndarray, carriers: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """The function without its carrier at places in [0, 1] of every piece, at corners and ends from inside."""
+        inset, ends = INSTANT * self._end, np.concatenate([[0.0], self._corners, [self._end]])
+        low, high = lefts + inset * np.isin(lefts, ends), rights - inset * np.isin(rights, ends)
+        offsets = (rights - lefts)[:, None] * places
+        times = np.clip(lefts[:, None] + offsets, low[:, None], high[:, None])
+        values = self._function(times.ravel()).reshape(times.shape)
+        if not np.all(np.isfinite(values)):
+            raise NumericalFailure("function of time: gives a value that is not finite")
+        return np.asarray(values * np.exp(-1j * carriers[:, None] * offsets) if np.any(carriers) else values)
+
+
+@functools.cache
+def _nodes() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Chebyshev points and midway points on [0, 1], values -> Chebyshev series, series -> values midway."""
+    angles = np.linspace(math.pi, 0.0, 2 * DEGREE + 1)
+    x = np.cos(angles)
+    own, between = x[::2], x[1::2]
+    fitted = np.linalg.inv(chebyshev.chebvander(own, DEGREE))
+    return (own + 1) / 2, (between + 1) / 2, fitted, chebyshev.chebvander(between, DEGREE)
+
+
+@functools.cache
+def _power_matrix() -> np.ndarray:
+    """Chebyshev series on [0, 1] -> powers of the place in the piece, (D + 1, D + 1)."""
+    rows = []
+    for k in range(DEGREE + 1):
+        powers = np.polynomial.Polynomial(chebyshev.cheb2poly(np.eye(DEGREE + 1)[k]))
+        shifted = powers(np.polynomial.Polynomial([-1.0, 2.0]))
+        rows.append(np.pad(shifted.coef, (0, DEGREE + 1 - len(shifted.coef))))
+    return np.array(rows)

@@ -1,0 +1,175 @@
+"""Exact free response of modal equations, as sums of exponentials.
+
+    eta'' + D eta' + diag(omega^2) eta = p,   p constant on modes with omega = 0, zero on the others
+    eta(t) = Re sum_j V_j c_j t^d_j exp(lambda_j t),   c = A eta(0) + B eta'(0) + P p
+
+omega^2 < 0 is a growing mode. D [1/s] is diagonal for proportional damping: then each mode has its own closed
+form (underdamped, overdamped, nearly critical by a Taylor polynomial, zero frequency, growing). A zero-frequency mode
+whose damping is slow beside the time that its motion lasts moves by powers of time: exponentials would be large terms,
+of eta' / D and p / D^2, with small differences. Modes that are coupled are in coupled_response.py. Constant forces on
+modes of non-zero frequency belong to the asymptotic configuration, not here.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from multiphi_exudyn.mathematics.response.exponentials import Exponentials
+from multiphi_exudyn.mathematics.round_off import SLOW
+
+__all__ = ["Chain", "ModalResponse", "is_slow", "slow_powers", "uncoupled"]
+
+NEARLY_CRITICAL = 1e-2  # |zeta^2 - 1|^(1/2) under which the Taylor polynomial of degree 5 is the more exact form
+LAST_POWER = 1e-17  # of the first: a power of time, in the speed of what is slow, that is left out
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Components y (m,) of a motion that move each other one way: y' = T y + B p, eta = ... + Re V y.
+
+    mixing: T (m, m) upper triangular. shapes: V (r, m). pushes: B (m, r).
+    """
+
+    mixing: np.ndarray
+    shapes: np.ndarray
+    pushes: np.ndarray
+
+
+@dataclass(frozen=True)
+class ModalResponse:
+    """The closed form of the module's equation.
+
+    basis: the p exponentials. shapes: V (r, p) complex. from_displacement, from_velocity, from_force:
+    A, B, P (p, r) complex. diagonal: whether D was diagonal to round-off. alone: (r,) modes with an equation of their
+    own. Of the other modes' motion poles (p,) are the exponentials that are one of it by themselves, chains the rest.
+    """
+
+    basis: Exponentials
+    shapes: np.ndarray
+    from_displacement: np.ndarray
+    from_velocity: np.ndarray
+    from_force: np.ndarray
+    diagonal: bool
+    alone: np.ndarray
+    poles: np.ndarray
+    chains: tuple[Chain, ...] = ()
+
+    def coefficients(
+        self, displacement: np.ndarray, velocity: np.ndarray, force: np.ndarray | None = None
+    ) -> np.ndarray:
+        """c (p,) of the motion that starts at eta(0), eta'(0), both (r,)."""
+        c: np.ndarray = (self._from_state @ np.concatenate([displacement, velocity])).view(complex)
+        return c if force is None else c + self.from_force @ force
+
+    def sizes(self, displacement: np.ndarray, velocity: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Of which terms (p,) the coefficients are the sums, from the sizes (r,) of eta(0), eta'(0) and p."""
+        maps = np.abs(self.from_displacement), np.abs(self.from_velocity), np.abs(self.from_force)
+        return np.asarray(maps[0] @ displacement + maps[1] @ velocity + maps[2] @ force)
+
+    def state(self, coefficients: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        """eta(t), eta'(t), both (r,)."""
+        r, values = len(self.shapes), self.basis.at(t)
+        if not self.basis.pure:
+            rate = self.basis.derivative(coefficients)
+            return (self.shapes @ (coefficients * values)).real, (self.shapes @ (rate * values)).real
+        both = self._to_state @ (coefficients * values).view(float)
+        return both[:r], both[r:]
+
+    @functools.cached_property
+    def _from_state(self) -> np.ndarray:
+        """[A, B] on real and imaginary parts, (2p, 2r): one real product where two complex ones stood."""
+        both = np.hstack([self.from_displacement, self.from_velocity])
+        return np.stack([both.real, both.imag], axis=1).reshape(2 * both.shape[0], both.shape[1])
+
+    @functools.cached_property
+    def _to_state(self) -> np.ndarray:
+        """(eta, eta') from real and imaginary parts of c phi, (2r, 2p), where every power is zero."""
+        both = np.vstack([self.shapes, self.shapes * self.basis.rates])
+        return np.stack([both.real, -both.imag], axis=2).reshape(both.shape[0], 2 * both.shape[1])
+
+
+def is_slow(rates: np.ndarray | complex, lasting: float) -> np.ndarray:
+    """Which rates [1/s] are slow beside the time [s] that a motion lasts at most; zero alone where that is infinite."""
+    return np.asarray(np.abs(rates) <= SLOW / lasting)
+
+
+def slow_powers(rate: complex, lasting: float) -> list[complex]:
+    """rate^n / (n + 2)!, n = 0, 1, ..., of a slow rate: exp(rate t) integrated twice is t^2 sum_n t^n of these."""
+    found, size = [0.5 + 0j], abs(rate) * lasting
+    speed = size / 2  # of the next power, in units of the first
+    while speed > LAST_POWER:
+        found.append(found[-1] * rate / (len(found) + 2))
+        speed *= size / (len(found) + 1)
+    return found
+
+
+def uncoupled(squares: np.ndarray, damping: np.ndarray, lasting: float = math.inf) -> ModalResponse:
+    """Closed form for omega^2 (r,) [rad2/s2], negative for growing modes, and damping D_ii (r,) [1/s].
+
+    lasting: for motions of that time [s] at most.
+    """
+    terms = [term for k in range(len(squares)) for term in _mode_terms(k, squares[k], damping[k] / 2, lasting)]
+    p, r = len(terms), len(squares)
+    shapes, maps = np.zeros((r, p), complex), np.zeros((3, p, r), complex)
+    for j, (k, _, _, weights) in enumerate(terms):
+        shapes[k, j] = 1.0
+        maps[:, j, k] = weights
+    basis = Exponentials(np.array([t[1] for t in terms], complex), np.array([t[2] for t in terms], int))
+    alone, poles = np.ones(r, bool), np.zeros(p, bool)
+    return ModalResponse(basis, shapes, maps[0], maps[1], maps[2], diagonal=True, alone=alone, poles=poles)
+
+
+Term = tuple[int, complex, int, tuple[complex, complex, complex]]  # mode, rate, power, weights of eta, eta', p
+
+
+def _mode_terms(k: int, square: float, delta: float, lasting: float) -> list[Term]:
+    """Terms of one mode eta'' + 2 delta eta' + omega^2 eta = p, omega^2 = ``square``."""
+    if square == 0.0:
+        return _free_terms(k, delta, lasting)
+    if square < 0:
+        return _growing_terms(k, square, delta)
+    omega = np.sqrt(square)
+    difference = (delta - omega) * (delta + omega)
+    root = np.sqrt(abs(difference))
+    if root <= NEARLY_CRITICAL * omega:
+        s = difference  # cosh, sinh(s t)/s of small s t, to t^5
+        even, odd = (1.0, 0.0, s / 2, 0.0, s**2 / 24, 0.0), (0.0, 1.0, 0.0, s / 6, 0.0, s**2 / 120)
+        return [(k, -delta, d, (e + delta * o, o, 0.0)) for d, (e, o) in enumerate(zip(even, odd, strict=True))]
+    if difference < 0:
+        return [(k, complex(-delta, root), 0, (1 - 1j * delta / root, -1j / root, 0.0))]
+    fast = -(delta + root)
+    slow = omega**2 / fast
+    return [
+        (k, slow, 0, (-fast / (slow - fast), 1 / (slow - fast), 0.0)),
+        (k, fast, 0, (slow / (slow - fast), -1 / (slow - fast), 0.0)),
+    ]
+
+
+def _growing_terms(k: int, square: float, delta: float) -> list[Term]:
+    """Terms of omega^2 < 0, delta >= 0: one rate grows and one decays, the smaller of them from their product."""
+    decaying = -(delta + np.sqrt(delta**2 - square))
+    growing = square / decaying
+    difference = growing - decaying
+    return [
+        (k, growing, 0, (-decaying / difference, 1 / difference, 0.0)),
+        (k, decaying, 0, (growing / difference, -1 / difference, 0.0)),
+    ]
+
+
+def _free_terms(k: int, delta: float, lasting: float) -> list[Term]:
+    """Terms of eta'' + 2 delta eta' = p; of what is slow p - 2 delta eta'(0) with its decay is integrated twice."""
+    rate, first = 2 * delta, [(k, 0.0, 0, (1.0, 0.0, 0.0)), (k, 0.0, 1, (0.0, 1.0, 0.0))]
+    if delta == 0.0:
+        return [*first, (k, 0.0, 2, (0.0, 0.0, 0.5))]
+    if is_slow(rate, lasting):
+        further = enumerate(slow_powers(-rate, lasting), start=2)
+        return [*first, *((k, 0.0, n, (0.0, -rate * weight, weight)) for n, weight in further)]
+    return [
+        (k, 0.0, 0, (1.0, 1 / rate, -1 / rate**2)),
+        (k, 0.0, 1, (0.0, 0.0, 1 / rate)),
+        (k, -rate, 0, (0.0, -1 / rate, 1 / rate**2)),
+    ]

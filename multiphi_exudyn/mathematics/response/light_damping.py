@@ -1,0 +1,165 @@
+"""Free response of oscillating modes that damping couples lightly: what each has of the others, by iteration.
+
+    (lambda^2 + lambda D + diag(omega^2)) v = 0,   D = diag(d) + G symmetric,   v_i = 1 in pair i
+
+From v = e_i, every row j gives its component, and row i the rate:
+
+    v_j = -lambda (G v)_j / (omega_j^2 - omega_i^2 + lambda (d_j - d_i - (G v)_i)),   j not i
+    lambda^2 + lambda (d_i + (G v)_i) + omega_i^2 = 0
+
+all pairs at once. It converges by the factor that damping is of the distance of two modes. As D is symmetric, the
+same vectors make the motion of a start (F. Tisseur, K. Meerbergen, The quadratic eigenvalue problem, SIAM Rev. 43
+(2001) 235, sec. 3):
+
+    eta(t) = Re sum_i v_i c_i exp(lambda_i t),   c_i = 2 v_i . (eta'(0) - omega^2 eta(0) / lambda_i) / theta_i
+    theta_i = v_i . (2 lambda_i + D) v_i
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+
+from multiphi_exudyn.mathematics.compiling.compiled import Numbers, Waves, compiled, entry
+from multiphi_exudyn.mathematics.response.exponentials import Exponentials
+from multiphi_exudyn.mathematics.response.free_response import ModalResponse
+
+__all__ = ["lightly_damped"]
+
+LIGHT = 0.2  # of omega, and of a distance of two modes: more damping is not light
+SYMMETRIC = 1e-13  # of the largest damping: round-off of a symmetric matrix
+LAST = 2e-16  # of a mode: the step after the last, if it is as much smaller as the least of those before
+MOST_STEPS = 30  # of the iteration; three to ten are typical
+
+
+def lightly_damped(squares: np.ndarray, damping: np.ndarray) -> ModalResponse | None:
+    """Closed form for omega^2 (r,) and damping D (r, r); None where D is not symmetric, or not light."""
+    r = len(squares)
+    numbers = np.concatenate([squares, damping.diagonal(), damping, np.zeros((4 * r + 2, r))], axis=None)
+    if not start_pairs(numbers, r):
+        return None
+    rows = numbers.reshape(-1, r)
+    coupling, vectors, moved = rows[2 : 2 + r], rows[2 + r : 2 + 3 * r], rows[2 + 3 * r : 2 + 5 * r]
+    before, falls = 1.0, 0.0
+    for _ in range(MOST_STEPS):
+        step = improve_pairs(numbers, r)
+        before, falls = step, max(falls, step / before)
+        vectors.dot(coupling, out=moved)
+        if step * falls <= LAST:
+            return _response(numbers, r)
+    return None
+
+
+def _response(numbers: np.ndarray, r: int) -> ModalResponse:
+    """Closed form for vectors that are found."""
+    waves = np.zeros((1 + 4 * r, r), complex)
+    write_response(numbers, waves.ravel(), r)
+    nothing, every, powers = _flags(r)
+    return ModalResponse(
+        basis=Exponentials(waves[0], powers),
+        shapes=waves[1 : 1 + r].T,
+        from_displacement=waves[1 + r : 1 + 2 * r],
+        from_velocity=waves[1 + 2 * r : 1 + 3 * r],
+        from_force=waves[1 + 3 * r :],
+        diagonal=False,
+        alone=nothing,
+        poles=every,
+    )
+
+
+@functools.lru_cache(maxsize=64)
+def _flags(r: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of coupled modes: that none is alone, that every exponential is a pole, and that none has a power of time."""
+    return np.zeros(r, bool), np.ones(r, bool), np.zeros(r, int)
+
+
+@compiled
+def start(numbers: Numbers, r: int) -> int:
+    """Whether damping is symmetric, and light for every mode and for every distance of two; then v = e_i.
+
+    numbers: omega^2, d (r,), D (r, r), of which G is made; v and G v of all pairs, a row each, (r, r), first real, then
+    imaginary parts; lambda (2, r).
+    """
+    coupling, vectors, moved, largest = 2 * r, (2 + r) * r, (2 + 3 * r) * r, 0.0
+    for i in range(r):
+        own = numbers[r + i]
+        largest = max(largest, own)
+        if not abs(own) < LIGHT * math.sqrt(max(numbers[i], 0.0)):
+            return 0
+        numbers[coupling + i * r + i] = 0.0
+        numbers[vectors + i * r + i] = 1.0
+    for j in range(r):
+        others = 0.0
+        for k in range(r):
+            given = numbers[coupling + j * r + k]
+            if not abs(given - numbers[coupling + k * r + j]) <= SYMMETRIC * largest:
+                return 0
+            others += abs(given)
+            numbers[moved + j * r + k] = given
+        for i in range(r):
+            if i != j and not others * math.sqrt(numbers[i]) <= LIGHT * abs(numbers[j] - numbers[i]):
+                return 0
+    return 1
+
+
+@compiled
+def set_rate(numbers: Numbers, r: int, i: int) -> int:
+    """lambda of pair i from G v, the root above the real axis; 0 where there is none."""
+    moved, rates = (2 + 3 * r + i) * r + i, (2 + 5 * r) * r + i
+    half = 0.5 * complex(numbers[r + i] + numbers[moved], numbers[moved + r * r])
+    left = numbers[i] - half * half
+    if not left.real > 0.0:
+        return 0
+    root = math.sqrt(0.5 * (abs(left) + left.real))
+    numbers[rates] = -0.5 * left.imag / root - half.real
+    numbers[rates + r] = root - half.imag
+    return 1
+
+
+@compiled
+def improve(numbers: Numbers, r: int) -> float:
+    """One step of all pairs from G v to v; by how much a part of v changes at most, infinite where one is no number."""
+    vectors, moved, rates, step = (2 + r) * r, (2 + 3 * r) * r, (2 + 5 * r) * r, 0.0
+    for i in range(r):
+        if set_rate(numbers, r, i) == 0:
+            return math.inf
+        rate, row = complex(numbers[rates + i], numbers[rates + r + i]), i * r
+        whole = complex(numbers[r + i] + numbers[moved + row + i], numbers[moved + r * r + row + i])
+        for j in range(r):
+            if j != i:
+                v, others = vectors + row + j, complex(numbers[moved + row + j], numbers[moved + r * r + row + j])
+                apart = numbers[j] - numbers[i] + rate * (numbers[r + j] - whole)
+                size = apart.real * apart.real + apart.imag * apart.imag
+                found = -rate * others * apart.conjugate() * (1.0 / size)
+                change = max(abs(found.real - numbers[v]), abs(found.imag - numbers[v + r * r]))
+                if not change < math.inf:
+                    return math.inf
+                step = max(step, change)
+                numbers[v], numbers[v + r * r] = found.real, found.imag
+    return step
+
+
+@compiled
+def write(numbers: Numbers, waves: Waves, r: int) -> None:
+    """lambda (r,), then of all pairs v, and what a start's places and speeds give it, a row each, (r, r)."""
+    vectors, moved, rates = (2 + r) * r, (2 + 3 * r) * r, (2 + 5 * r) * r
+    for i in range(r):
+        set_rate(numbers, r, i)
+        rate, row, theta = complex(numbers[rates + i], numbers[rates + r + i]), i * r, 0j
+        for j in range(r):
+            v = complex(numbers[vectors + row + j], numbers[vectors + r * r + row + j])
+            others = complex(numbers[moved + row + j], numbers[moved + r * r + row + j])
+            theta += v * ((2.0 * rate + numbers[r + j]) * v + others)
+            waves[r + row + j] = v
+        weight = theta.conjugate() * (2.0 / (theta.real * theta.real + theta.imag * theta.imag))
+        turned = rate.conjugate() * (-1.0 / (rate.real * rate.real + rate.imag * rate.imag))
+        waves[i] = rate
+        for j in range(r):
+            on_speed = weight * waves[r + row + j]
+            waves[(1 + r) * r + row + j] = numbers[j] * (turned * on_speed)
+            waves[(1 + 2 * r) * r + row + j] = on_speed
+
+
+start_pairs, improve_pairs, write_response = entry(start), entry(improve), entry(write)

@@ -1,0 +1,154 @@
+"""Bounds of signals and of their derivatives, and the sample distance that follows from them, on flat buffers.
+
+    g(t) = constant + Re sum_j a_j phi_j(t),   |g^(k)(t)| <= sum_j |a_j^(k)| (t/T)^d_j exp(Re lambda_j t)
+
+a^(k): coefficients of the k-th derivative. Signals are as in zero_crossing.py.
+"""
+
+from __future__ import annotations
+
+import math
+
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
+from multiphi_exudyn.mathematics.response.basis_arrays import (
+    POWERS,
+    RATES,
+    SCALES,
+    SIZE,
+    exponential_size,
+    magnitude,
+)
+from multiphi_exudyn.mathematics.round_off import ZERO
+
+__all__ = [
+    "BOUNDING",
+    "DERIVATIVES",
+    "HERMITE",
+    "INTERVALS",
+    "LIFTED",
+    "OF_A_SIGNAL",
+    "OPPOSITE",
+    "QUINTIC",
+    "all_above",
+    "all_finite",
+    "bound",
+    "power_of_two_above",
+    "round_off",
+    "sample_distance",
+]
+
+DERIVATIVES = 7  # g and its derivatives up to the sixth are bounded
+OPPOSITE = 7  # 1 where a signal moves as the one before it does, in the opposite direction, else 0
+OF_A_SIGNAL = 8  # numbers: its bounds, and whether it is opposite
+BOUNDING = 4  # in p: numbers that are worked in behind the bounds
+INTERVALS = 64  # in a block
+RESOLUTION = 0.004  # wanted remainder of a block's intervals, of the signal's typical size
+HERMITE = 1 / 384
+QUINTIC = 1 / 46080  # max of u^3 (1 - u)^3 / 720 on [0, 1]
+LIFTED = 1 / 162  # max of u (1 - u)^2 / 24 on [0, 1]
+
+
+@compiled
+def bound(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    basis: int,
+    signals: int,
+    count: int,
+    start: float,
+    latest: float,
+    bounds: int,
+) -> None:
+    """Upper bounds of |g|, |g'|, ..., |g^(6)| on [start, latest], constants left out, and which signals are opposite.
+
+    sum_j b_j with b_j = |a_j| (latest / T)^d_j exp(min(Re lambda_j, 0) start + max(Re lambda_j, 0) latest) for g; every
+    derivative has |lambda_j| b_j + d_j+1 / latest b_j+1 in place of b_j, where j + 1 is of the next power. BOUNDING p
+    numbers behind the bounds are worked in.
+    """
+    p, powers, rates = ints[basis + SIZE], ints[basis + POWERS], ints[basis + RATES]
+    sizes, fast, envelope, link = bounds + OF_A_SIGNAL * count, p, 2 * p, 3 * p
+    ratio, height = latest / numbers[ints[basis + SCALES]], 1.0
+    for j in range(p):
+        decay = waves[rates + j].real
+        numbers[sizes + link + j] = 0.0
+        if ints[powers + j] > 0:
+            height *= ratio
+            numbers[sizes + link + j - 1] = ints[powers + j] / latest
+        else:
+            exponent = decay * (start if decay < 0.0 else latest)
+            height = exponential_size(exponent) if exponent != 0.0 else 1.0
+        numbers[sizes + envelope + j] = height
+        numbers[sizes + fast + j] = magnitude(waves, rates + j)
+    for s in range(count):
+        own, opposite = bounds + OF_A_SIGNAL * s, is_opposite(waves, signals + s * p, p) if s > 0 else 0
+        numbers[own + OPPOSITE] = opposite
+        for k in range(DERIVATIVES if opposite == 1 else 0):
+            numbers[own + k] = numbers[own - OF_A_SIGNAL + k]
+        for j in range(p if opposite == 0 else 0):
+            numbers[sizes + j] = magnitude(waves, signals + s * p + j) * numbers[sizes + envelope + j]
+        for k in range(DERIVATIVES if opposite == 0 else 0):
+            total = 0.0
+            for j in range(p):
+                size = numbers[sizes + j]
+                total += size
+                linked = numbers[sizes + link + j] * numbers[sizes + j + 1]  # the last one to none
+                numbers[sizes + j] = size * numbers[sizes + fast + j] + linked
+            numbers[own + k] = total
+
+
+@compiled
+def is_opposite(waves: Waves, signal: int, p: int) -> int:
+    """1 where the coefficients (p,) of a signal are those of the one before it with the other sign."""
+    for j in range(p):
+        if waves[signal + j] != -waves[signal - p + j]:
+            return 0
+    return 1
+
+
+@compiled
+def all_above(numbers: Numbers, constants: int, bounds: int, count: int) -> int:
+    """1 where every constant outweighs all that moves."""
+    for s in range(count):
+        if not numbers[constants + s] > numbers[bounds + OF_A_SIGNAL * s]:
+            return 0
+    return 1
+
+
+@compiled
+def all_finite(numbers: Numbers, constants: int, bounds: int, count: int) -> int:
+    """1 where the signals and their highest derivatives are bounded by finite numbers."""
+    for s in range(count):
+        first = bounds + OF_A_SIGNAL * s
+        if not abs(numbers[constants + s]) + numbers[first] + numbers[first + DERIVATIVES - 1] < math.inf:
+            return 0
+    return 1
+
+
+@compiled
+def sample_distance(numbers: Numbers, constants: int, bounds: int, count: int, remaining: float) -> float:
+    """Sample distance of the next block: a power of two, at which the remainder is small beside the signals.
+
+    Never more than what takes the block to the horizon, where it ends at once.
+    """
+    longest = power_of_two_above(remaining / INTERVALS)
+    step = math.inf
+    for s in range(count):
+        fourth = numbers[bounds + OF_A_SIGNAL * s + 4]
+        if fourth > 0.0:
+            wanted = RESOLUTION * (abs(numbers[constants + s]) + numbers[bounds + OF_A_SIGNAL * s]) / HERMITE
+            distance = math.sqrt(math.sqrt(wanted / fourth))
+            step = min(step, distance) if distance > 0.0 else step  # what has decayed below all numbers limits nothing
+    return min(longest, power_of_two_above(step) / 2) if step < math.inf else longest
+
+
+@compiled
+def power_of_two_above(value: float) -> float:
+    """The smallest power of two that is greater than ``value``."""
+    return math.ldexp(1.0, math.frexp(value)[1])
+
+
+@compiled
+def round_off(size: float, constant: float, noise: float) -> float:
+    """What |g| is round-off of its terms, or of what they are made of."""
+    return max(ZERO * (size + abs(constant)), noise)

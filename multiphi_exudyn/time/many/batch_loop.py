@@ -1,0 +1,152 @@
+"""Carrying: starts that stand in the arrays carried to the end one after the other, and looked at, by one call each.
+
+A start that meets something on its way, a level that is not there yet, a full record, a failure, ends the call.
+"""
+
+from __future__ import annotations
+
+from multiphi_exudyn.events.arrays import (
+    COORDINATE_COUNT,
+    DECISIONS,
+    DRIVE_NEXT,
+    END_REACHED,
+    EVENT_COUNT,
+    FOUND,
+    FRESH,
+    GIVEN_UP,
+    HORIZON,
+    IMPACT_COUNT,
+    LEFT_OUT_COUNT,
+    NEED,
+    OF_A_RUN,
+    OK,
+    PHASE_COUNT,
+    PIECE,
+    PRESCRIBED,
+    SEEN,
+    SEGMENT_COUNT,
+    SEGMENT_ROOM,
+    START,
+    STARTING,
+    STOP_AT_EVENT,
+    SUMMED,
+    TIME,
+    TRANSITIONS,
+)
+from multiphi_exudyn.events.states.channel_values import keep_drive, load_piece, set_drive
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Shorts, Waves, compiled
+from multiphi_exudyn.time.loop.loop import advance
+from multiphi_exudyn.time.loop.loop_record import keep_segment
+from multiphi_exudyn.time.record.sampling import sample_rows, sample_sizes
+
+__all__ = ["ENDS", "TOLD_WIDTH", "carry_starts", "measure_starts", "sample_starts"]
+
+ENDS = 6  # ints: segments, coordinates, phases, events, segments left out and impacts up to the end of a run
+TOLD_WIDTH = OF_A_RUN + 2
+
+
+@compiled
+def carry_starts(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    end: float,
+    until: float,
+    fresh: Numbers,
+    count: int,
+    ends: Ints,
+    told: Numbers,
+) -> int:
+    """Carries the starts that stand in the arrays to ``end`` one after the other; how many of them have come there.
+
+    until: how long the first piece of the channels lasts. fresh: the numbers of a run at its start. ends: counts
+    (count + 1, ENDS) of the record, the first ones zero. told: numbers (count, TOLD_WIDTH) of each run, and its
+    function evaluations and transitions. A segment of no length after those of a run has its final state.
+    """
+    for k in range(count):
+        for i in range(OF_A_RUN):
+            numbers[i] = fresh[i]
+        ints[START], ints[STARTING], ints[STOP_AT_EVENT], ints[GIVEN_UP] = k, FRESH, 0, 0
+        ints[DECISIONS], ints[TRANSITIONS], ints[PIECE] = 0, 0, 0
+        numbers[ints[FOUND] + 1] = 0.0
+        if ints[PRESCRIBED] > 0:
+            load_piece(ints, waves)
+            set_drive(ints, numbers, waves, ints[DRIVE_NEXT], 0.0, numbers[TIME], until)
+            keep_drive(ints, waves)
+        status = advance(ints, numbers, waves, end)
+        if status != END_REACHED or ints[SEGMENT_COUNT] >= ints[SEGMENT_ROOM]:
+            before = ENDS * k
+            ints[SEGMENT_COUNT], ints[COORDINATE_COUNT] = ends[before], ends[before + 1]
+            ints[PHASE_COUNT], ints[EVENT_COUNT] = ends[before + 2], ends[before + 3]
+            ints[LEFT_OUT_COUNT], ints[IMPACT_COUNT] = ends[before + 4], ends[before + 5]
+            return k
+        for i in range(OF_A_RUN):
+            told[k * TOLD_WIDTH + i] = numbers[i]
+        told[k * TOLD_WIDTH + OF_A_RUN] = numbers[ints[FOUND] + 1]
+        told[k * TOLD_WIDTH + OF_A_RUN + 1] = ints[TRANSITIONS]
+        ints[SUMMED] = 1  # nothing works in no time
+        keep_segment(ints, numbers, 0.0, numbers[HORIZON])
+        after = ENDS * (k + 1)
+        ends[after], ends[after + 1], ends[after + 2] = ints[SEGMENT_COUNT], ints[COORDINATE_COUNT], ints[PHASE_COUNT]
+        ends[after + 3], ends[after + 4], ends[after + 5] = ints[EVENT_COUNT], ints[LEFT_OUT_COUNT], ints[IMPACT_COUNT]
+    return count
+
+
+@compiled
+def sample_starts(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    rows: Shorts,
+    coordinates: Numbers,
+    offsets: Ints,
+    instants: Numbers,
+    ends: Ints,
+    runs: int,
+    functions: Numbers,
+    levels: int,
+    points: int,
+    width: int,
+    times: Numbers,
+    count: int,
+    values: Numbers,
+) -> int:
+    """Values (runs, points, count) at times [s] in a record of ``carry_starts`` (sampling.py); OK or NEED.
+
+    functions: the points' rows (points, levels, 2 width + 1).
+    """
+    for k in range(runs):
+        for p in range(points):
+            place, function = (k * points + p) * count, p * levels * (2 * width + 1)
+            status = sample_rows(
+                ints, numbers, waves, rows, coordinates, offsets, instants, ends[ENDS * k], ends[ENDS * (k + 1)] - 1,
+                functions, function, width, times, count, 0, values, place,
+            )  # fmt: skip
+            if status == NEED:
+                return NEED
+    return OK
+
+
+@compiled
+def measure_starts(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    rows: Shorts,
+    coordinates: Numbers,
+    offsets: Ints,
+    instants: Numbers,
+    ends: Ints,
+    asked: Ints,
+    runs: int,
+    end: float,
+    sizes: Numbers,
+) -> int:
+    """Mean of |y|^2 and largest energy (runs, 2) of those ``asked`` for, by ``sample_sizes``; OK or NEED."""
+    for i in range(runs):
+        first, last = ends[ENDS * asked[i]], ends[ENDS * (asked[i] + 1)] - 1
+        status = sample_sizes(ints, numbers, waves, rows, coordinates, offsets, instants, first, last, end)
+        if status == NEED:
+            return NEED
+        sizes[2 * i], sizes[2 * i + 1] = numbers[SEEN + 1], numbers[SEEN + 2]
+    return OK

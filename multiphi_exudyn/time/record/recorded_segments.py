@@ -1,0 +1,196 @@
+"""Segments and events of a record, which are made when somebody looks at them."""
+
+from __future__ import annotations
+
+import bisect
+import functools
+from collections.abc import Callable, Sequence
+from typing import Generic, TypeVar, overload
+
+import numpy as np
+
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.events.transitions.state import Event, Loss
+from multiphi_exudyn.mechanics.element import event_kind
+from multiphi_exudyn.time.record.record import Record
+from multiphi_exudyn.time.segments.segment import Segment, Segments
+
+__all__ = ["Events", "Recorded"]
+
+T = TypeVar("T")
+
+
+class Made(Sequence[T], Generic[T]):
+    """A sequence of objects that are made one by one when they are asked for; compares like a tuple."""
+
+    _make: Callable[[int], T]
+    _count: int
+    _known: dict[int, T]
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> T: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[T, ...]: ...
+    def __getitem__(self, index: int | slice) -> T | tuple[T, ...]:
+        positions = range(self._count)[index]
+        return self._one(positions) if isinstance(positions, int) else tuple(map(self._one, positions))
+
+    def _one(self, i: int) -> T:
+        if i not in self._known:
+            self._known[i] = self._make(i)
+        return self._known[i]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sequence) and tuple(self) == tuple(other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return repr(tuple(self))
+
+
+class Recorded(Made[Segment], Segments):
+    """The segments of a record so far, which is looked into when somebody asks; defects, truncated: see Segments.
+
+    summed: works [J] of all that the record does not list as left out.
+    """
+
+    def __init__(
+        self,
+        record: Record,
+        defects: float,
+        truncated: float,
+        summed: tuple[float, float, float],
+        verdict: tuple[float, float] = Segments.verdict,
+    ) -> None:
+        self._make, self._count, self._known = record.segment, record.count, {}
+        self._record, self.arrays = record, record.arrays
+        self.defects, self.truncated, self.verdict = defects, truncated, verdict
+        self._summed, self._left_out = summed, record.left_out_count
+
+    @functools.cached_property
+    def starts(self) -> np.ndarray:
+        """See ``Segments``."""
+        return self._record.instants[: self._count]
+
+    @functools.cached_property
+    def ends(self) -> np.ndarray:
+        """See ``Segments``."""
+        return self._record.instants[1 : self._count + 1]
+
+    @functools.cached_property
+    def numbers(self) -> np.ndarray:
+        """See ``Segments``."""
+        return self._record.rows[: self._count, 0]
+
+    @property
+    def settled(self) -> np.ndarray:
+        """See ``Segments``."""
+        return np.asarray(self._record.rows[: self._count, 3] < 0)
+
+    @property
+    def levels(self) -> Sequence[LoadedLevel]:
+        """See ``Segments``."""
+        return self._record.levels
+
+    @property
+    def visited(self) -> tuple[tuple[int, ...], ...]:
+        """See ``Segments``."""
+        return self._record.visited
+
+    def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """See ``Segments``."""
+        return self._record.states(places, after)
+
+    def values(self, times: np.ndarray, side: str, row: Callable[[LoadedLevel], np.ndarray]) -> np.ndarray:
+        """See ``Segments``."""
+        return self._record.values(times, side, row)
+
+    def sizes(self, end: float) -> tuple[float, float]:
+        """See ``Segments``."""
+        return self._record.sizes(end)
+
+    def _integral(
+        self, level: LoadedLevel, row: np.ndarray, places: np.ndarray, starts: np.ndarray, ends: np.ndarray
+    ) -> float:
+        """See ``Segments``; in closed form at once where no channel is a function of time."""
+        if level.excitation.prescribed:
+            return super()._integral(level, row, places, starts, ends)
+        response, r, n = level.response, level.modal.modes, level.width
+        x, v = self.states(places, starts - self.starts[places])[:, :, :n]
+        c = x[:, :r] @ response.from_displacement.T + v[:, :r] @ response.from_velocity.T
+        if level.driven:
+            c = c + response.from_force @ level.asymptotic.drive
+        terms = row[:r] @ response.shapes + row[n : n + r] @ response.basis.derivative(response.shapes)
+        moved = (c * terms * response.basis.integrals((ends - starts)[:, None])).real.sum()
+        return float(moved + (row[-1] + x[:, r:] @ row[r:n]) @ (ends - starts))
+
+    @property
+    def works(self) -> tuple[float, float, float]:
+        """See ``Segments``."""
+        return self._completed if self._left_out else self._summed
+
+    @functools.cached_property
+    def _completed(self) -> tuple[float, float, float]:
+        """The works with those of the segments that were left out."""
+        damping, varying, friction = self._summed
+        further = self._record.works(self._record.left_out[: self._left_out])
+        return damping + further[0], varying + further[1], friction + further[2]
+
+
+class Events(Made[Event]):
+    """The events of a record so far; lost (6,): the energies [J] that left at all of them."""
+
+    def __init__(self, record: Record, lost: np.ndarray) -> None:
+        self._count, self._known = 0 if record.eventless else len(record.places), {}
+        self._record, self._lost = record, lost
+
+    @property
+    def loss(self) -> Loss:
+        """The energies [J] that left at all of them."""
+        return Loss(*self._lost.tolist())
+
+    def impulse(self, contact: str, first: float, last: float) -> float:
+        """What a contact was struck with [N s] in [first, last] [s], impacts of others included."""
+        names, times = [name for name, _ in self._record.told], self._record.amounts[:, 0]
+        own = (self._record.kinds[:, 0] == names.index(contact)) & (times >= first) & (times <= last)
+        return float(self._impulses[own].sum())
+
+    def table(self) -> np.ndarray:
+        """Time [s], position of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4)."""
+        places, amounts = self._record.places, self._record.amounts
+        time, truncation = amounts[places, 0], amounts[places, 1] + amounts[places, 2]
+        return np.column_stack([time, self._record.kinds[places, 0], self._impulses[places], truncation])
+
+    @property
+    def _impulses(self) -> np.ndarray:
+        """Of every row of kinds (m,) [N s]."""
+        impulses = np.zeros(len(self._record.kinds))
+        impulses[self._record.struck] = self._record.impacts[:, 0]
+        return impulses
+
+    def _impact(self, place: int) -> list[float]:
+        """The row of impacts that belongs to a row of kinds, zeros where there is none."""
+        struck = self._record.struck
+        k = bisect.bisect_left(struck, place)
+        if k == len(struck) or struck[k] != place:
+            return [0.0] * a.IMPACT_WIDTH
+        found: list[float] = self._record.impacts[k].tolist()
+        return found
+
+    def _make(self, i: int) -> Event:
+        """The i-th event."""
+        record, told = self._record, self._record.told
+        place = int(record.places[i])
+        before = int(record.places[i - 1]) + 1 if i else 0
+        time, kinetic, strain = record.amounts[place].tolist()
+        impulse, impact, stop_work, damping, friction = self._impact(place)
+        contact, entered, left = record.kinds[place].tolist()
+        shared = tuple((told[record.kinds[k, 0]][0], self._impact(k)[0]) for k in range(before, place))
+        name, states = told[contact]
+        kind, loss = event_kind(states, left, entered), Loss(impact, kinetic, strain, stop_work, damping, friction)
+        return Event(time, name, kind, loss, impulse, shared, states[entered].name)

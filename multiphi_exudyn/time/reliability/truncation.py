@@ -1,0 +1,119 @@
+"""Truncation: how far an answer with r modes can be from the answer with all of them, read off the answer itself.
+
+The indicator adds the defects of a run (defects.py) like independent errors and relates them to the motion:
+
+    indicator(T) = sqrt( sum over instants until T of |defect|^2 / mean of |y|^2 over [0, T] )
+
+The mean is that of a polygon through 25 instants evenly spaced: the indicator is known to some per cent of itself. It
+predicts an error, it does not bound it: it knows nothing of how fast neighbouring motions separate, and what one level
+holds and the next one drops weighs little in it (keep the levels' highest frequencies near each other).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError
+from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.levels.mode_choice import TRIED, Tolerance, UpTo
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.time.reliability.defects import DefectHistory
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+
+__all__ = ["adapted", "truncation_indicator"]
+
+FEWEST = 3  # modes the open level starts with
+GROWTH = 0.25  # of its modes it is given more, at least one
+ABOVE = 1 + 1e-9  # of its last mode's frequency: the cut-off that keeps this mode
+
+
+def truncation_indicator(trajectory: Trajectory, until: float | None = None) -> float:
+    """Estimate of the relative error of displacements that truncation has made.
+
+        indicator(T) = sqrt( sum over instants until T of |defect|^2 / mean of |y|^2 over [0, T] )
+
+    The defects of a run are what the modes of the next level could not hold at its events; the mean is that of a
+    polygon through 25 instants evenly spaced. The indicator predicts an error, it does not bound it: it knows nothing
+    of how fast neighbouring motions separate.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Of ``simulate``.
+    until : float, default None
+        T [s], None for the end of the trajectory.
+
+    Returns
+    -------
+    float
+        The estimate; 0.01 is 1 %.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For what is no Trajectory.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> model = mp.MultiPhiModel(chain, [stop])
+    >>> pulled = model.static_equilibrium({"tip": 100.0})
+    >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+    >>> mp.truncation_indicator(tr) < 1e-9  # all modes are kept: nothing is lost
+    True
+    """
+    if not isinstance(trajectory, Trajectory):
+        raise MultiPhiTypeError(f"trajectory: got {type(trajectory).__name__}, need a Trajectory")
+    return DefectHistory.of(trajectory).indicator(trajectory.t_end if until is None else until)
+
+
+def adapted(model: MultiPhiModel, run: Callable[[MultiPhiModel], Trajectory]) -> Trajectory:
+    """``run`` of the model at the cut-off frequency that its Tolerance needs, which is that of ``Trajectory.model``.
+
+    The open level begins with the modes that hold the static flexibility of every contact, and is given more until
+    the indicator is below the tolerance; every other level has its modes up to the same frequency. All modes of the
+    structure are the last that is tried where there are no more than the tolerance allows. The base, at first that of
+    TRIED modes, is extended to twice as many when they are asked for.
+    """
+    tolerance = model.modes
+    assert isinstance(tolerance, Tolerance), "who calls this has looked"
+    most = min(tolerance.most, model.structure.n)
+    source = replace(model, modes=most if model.base.complete else min(most, TRIED))
+    level = source.level(())
+    rigid = int(np.sum(level.omega == 0))
+    count = max(_holding(level, tolerance.error), min(rigid + 1, most))
+    while True:
+        if count > level.modes and level.modes < most:
+            source = replace(source, modes=min(most, 2 * level.modes))
+            level = source.level(())
+        count = min(count, level.modes)
+        trajectory = run(replace(source, modes=_first(level, count)))
+        enough = trajectory.status != "ok" or truncation_indicator(trajectory) <= tolerance.error
+        if enough or count == most:
+            return trajectory
+        count += max(1, round(GROWTH * count))
+
+
+def _first(level: Level, count: int) -> str | int | UpTo:
+    """The choice of modes that keeps so many in the open level and the same frequencies in the others."""
+    highest = float(level.frequencies[count - 1])
+    if count == level.base.modes.count:
+        return "all"
+    return UpTo(ABOVE * highest, count) if highest > 0 else count
+
+
+def _holding(level: Level, error: float) -> int:
+    """Smallest number of modes that leaves of every contact's flexibility a static residual below the error."""
+    elastic = level.omega > 0
+    flexibility = np.zeros_like(level.gap_rows)
+    flexibility[:, elastic] = (level.gap_rows[:, elastic] / level.omega[elastic]) ** 2
+    held = np.cumsum(flexibility, axis=1)
+    enough = held >= (1 - error) * held[:, -1:]
+    return max(FEWEST, 1 + int(np.max(np.argmax(enough, axis=1), initial=0)))

@@ -1,0 +1,83 @@
+"""Left out: sentences on what truncation took of a run, from its verdict (verdict.py)."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from multiphi_exudyn.display import per_cent
+from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.levels.mode_choice import Tolerance
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.time.loop.motion_size import INDICATOR, SAMPLES
+from multiphi_exudyn.time.loop.verdict import judge
+from multiphi_exudyn.time.reliability.defects import total_defect
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.warnings.model_warnings import REMEDY
+
+__all__ = ["energy_warning", "least_indicator", "left_out_warnings", "verdict_of"]
+
+TEXTS = 64  # sentences of each kind that are kept, by their number
+RIGID_INDICATOR = 0.05  # where a rigid contact is struck: its impacts raise the indicator more than the error
+
+
+def least_indicator(tolerance: Tolerance | None) -> float:
+    """From which on it is told; tolerance: the one that the modes were decided by."""
+    return INDICATOR if tolerance is None else min(INDICATOR, tolerance.error)
+
+
+def verdict_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[float, float]:
+    """The verdict on a run of which the loop did not know enough, or not the limit.
+
+    tolerance: the one that the modes were decided by.
+    """
+    if trajectory.model.whole:
+        return 0.0, 0.0
+    limit = least_indicator(tolerance)
+    numbers, isolated = trajectory.ending.numbers.copy(), int(trajectory.ending.record.arrays.levels.isolated)
+    numbers[a.DEFECTS] = total_defect(trajectory)
+    numbers[a.GIVEN_SQUARE] = numbers[a.GIVEN_SQUARE] or np.sum(trajectory.start.displacement**2)
+    judge(numbers, isolated, limit, trajectory.t_end)
+    if np.isnan(numbers[a.VERDICT : a.VERDICT + 2]).any():
+        numbers[a.LOOKED : a.LOOKED + a.LOOK_WIDTH] = SAMPLES, *trajectory.segments.sizes(trajectory.t_end)
+        numbers[a.LOOK_END] = trajectory.t_end
+        judge(numbers, isolated, limit, trajectory.t_end)
+    share, error = numbers[a.VERDICT : a.VERDICT + 2].tolist()
+    return share, error
+
+
+def left_out_warnings(
+    model: MultiPhiModel, verdict: tuple[float, float], tolerance: Tolerance | None, struck: bool
+) -> tuple[str, ...]:
+    """Of the energy that truncation took, and of the motion that it did; struck: whether a rigid contact was."""
+    share, error = verdict
+    if tolerance is not None and error > tolerance.error:
+        return energy_warning(share) + _tolerance_warning(model, error, tolerance)
+    return energy_warning(share) + _motion_warning(error, struck)
+
+
+def _tolerance_warning(model: MultiPhiModel, error: float, tolerance: Tolerance) -> tuple[str, ...]:
+    """Of an indicator above the tolerance that the modes were decided by."""
+    kept = model.level_at(()).modes
+    return (
+        f"truncation: the indicator is {error:.2g} with {kept} modes, the tolerance {tolerance.error:g}; "
+        "give Tolerance a larger most=, or a new model, so that it decides by this run",
+    )
+
+
+@functools.lru_cache(TEXTS)
+def energy_warning(share: float) -> tuple[str, ...]:
+    """Of the energy lost, of the largest of the run; nothing where that is too small to be told."""
+    if not share > 0:
+        return ()
+    return (f"lost energy: truncation took {per_cent(share)} of the largest energy of the run; {REMEDY}",)
+
+
+@functools.lru_cache(TEXTS)
+def _motion_warning(error: float, struck: bool) -> tuple[str, ...]:
+    """Of the estimated error, which is four times the true one in the mean where a rigid contact was struck."""
+    if not error > (RIGID_INDICATOR if struck else INDICATOR):
+        return ()
+    typical = ", with rigid contacts a quarter of that is typical" if struck else ""
+    return (f"truncation: displacements may be off by {per_cent(error)} of the motion{typical}; {REMEDY}",)

@@ -1,0 +1,289 @@
+"""Segment: the motion in one level between two events, as a sum of exponentials (eq. 38.4, segment_flow.py).
+
+    xi(t) = Re V (c phi(t - t_k))   on [t_k, t_k+1]
+
+Gaps, contact forces and energies follow in closed form, works by quadrature.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.display import Shown
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.events.transitions.state import Phase
+from multiphi_exudyn.mathematics.response.exponentials import Exponentials
+from multiphi_exudyn.time.loop.motion_size import SAMPLES
+from multiphi_exudyn.time.segments.quadrature import panels, works
+from multiphi_exudyn.time.segments.segment_flow import Flow
+
+__all__ = ["Listed", "Segment", "Segments", "listed", "owners"]
+
+MOST_SAMPLES = 10_000  # of a gap in one segment: what looking for its smallest value may cost
+
+
+@dataclass(frozen=True, repr=False)
+class Segment(Shown):
+    """Motion in one level from ``start`` to ``end`` [s]; flow: its closed form, c (p,) its coefficients.
+
+    phases: of every contact at the start; armed_at: when after it [s] the last of them was armed. entry_work: work [J]
+    of what jumped where it begins.
+    """
+
+    start: float
+    end: float
+    level: LoadedLevel
+    flow: Flow
+    phases: tuple[Phase, ...]
+    armed_at: float
+    entry_work: float = 0.0
+
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        yield "time", f"{self.start:.6g} to {self.end:.6g} s"
+        yield "states", str(self.level.states)
+
+    def modal(self, t: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """xi or its first or second derivative, (r + q, k) at times (k,)."""
+        rows = self.rows
+        for _ in range(derivative):
+            rows = self.basis.derivative(rows)
+        return np.asarray((rows @ self.basis.at(t - self.start).T).real)
+
+    @property
+    def basis(self) -> Exponentials:
+        """The exponentials phi (p,) of the motion."""
+        return self.flow.basis
+
+    @property
+    def rows(self) -> np.ndarray:
+        """xi = Re rows phi(t - start), (r + q, p)."""
+        return self.flow.shapes * self.flow.coefficients
+
+    def gaps(self, contact: int, t: np.ndarray) -> np.ndarray:
+        """Gap (k,) [m] of a contact at times (k,)."""
+        return np.asarray(self.level.level.gap_rows[contact] @ self.modal(t) + self.level.gap_constants[contact])
+
+    def force(self, contact: int, t: np.ndarray) -> np.ndarray:
+        """Contact force (k,) [N] at times (k,), zero where the contact is open."""
+        own = self.level.level
+        if contact not in own.indices:
+            return np.zeros(len(t))
+        k = own.indices.index(contact)
+        moving = own.force_rows[k] @ self.modal(t) + own.force_rate_rows[k] @ self.modal(t, 1)
+        return np.asarray(moving + self.level.asymptotic.forces[k])
+
+    def integral(self, row: np.ndarray, start: float, end: float) -> float:
+        """Integral over time of a row (2 (r + q) + 1,) of (xi, xi', 1); of a sum of free exponentials closed."""
+        rows, free, n = self.rows, self.flow.free, len(row) // 2
+        terms = row[:n] @ rows + row[n:-1] @ self.basis.derivative(rows)
+        basis = Exponentials(self.basis.rates[:free], self.basis.powers[:free], self.basis.unit)
+        integral = float((basis.shifted(terms[:free], start - self.start) @ basis.integrals(end - start)).real)
+        for times, weights in panels(self.basis.rates[free:], start, end):
+            integral += float(((self.basis.at(times - self.start)[:, free:] @ terms[free:]).real) @ weights)
+        return integral + float(row[-1]) * (end - start)
+
+    def energy(self, t: np.ndarray) -> np.ndarray:
+        """Kinetic + strain energy (k,) [J] at times (k,)."""
+        return np.asarray(self.level.kinetic(self.modal(t, 1)) + self.level.strain(self.modal(t)))
+
+    @functools.cached_property
+    def works(self) -> tuple[float, float, float]:
+        """Work [J] of damping, of loads and stops that vary in time, and of friction."""
+        damping, varying, friction = works(self.level, self.modal, self.basis.rates, self.start, self.end)
+        return damping, self.entry_work + varying, friction
+
+    def unarmed_times(self, samples: int) -> np.ndarray:
+        """Times (k,) until the only unarmed contact is armed; to the end where it is not, or where there are several.
+
+        ``samples`` in the shortest period of the level and at least as many in all.
+        """
+        waiting = sum(phase is not Phase.ARMED for phase in self.phases)
+        end = self.start + self.armed_at if waiting == 1 and self.armed_at > 0 else self.end
+        periods = self.level.level.highest_frequency * (end - self.start)
+        return np.linspace(self.start, end, samples + math.ceil(min(samples * periods, MOST_SAMPLES)))
+
+
+class Segments(Sequence[Segment], ABC):
+    """The segments of a run, in order, and in arrays what many of them are asked for together.
+
+    defects: sum of |defect|^2 (defects.py) [m2 kg], truncated: of energies lost to truncation at events without their
+    signs [J]; nan where the loop has not summed them. verdict: what these are of the run (verdict.py), nan where that
+    is not known.
+    """
+
+    defects = math.nan
+    truncated = math.nan
+    verdict = math.nan, math.nan
+
+    @property
+    @abstractmethod
+    def starts(self) -> np.ndarray:
+        """When they begin (n,) [s]."""
+
+    @property
+    @abstractmethod
+    def ends(self) -> np.ndarray:
+        """When they end (n,) [s]."""
+
+    @property
+    @abstractmethod
+    def numbers(self) -> np.ndarray:
+        """The numbers (n,) of their levels in ``levels``."""
+
+    @property
+    @abstractmethod
+    def settled(self) -> np.ndarray:
+        """Whether (n,) every exit is armed where they begin: then no signal is below zero in them."""
+
+    @property
+    @abstractmethod
+    def levels(self) -> Sequence[LoadedLevel]:
+        """The levels that were visited, each once."""
+
+    @property
+    def visited(self) -> tuple[tuple[int, ...], ...]:
+        """The same by the states of their elements."""
+        return tuple([level.states for level in self.levels])
+
+    @abstractmethod
+    def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """xi and xi' (2, k, n) of the segments ``places`` (k,), times ``after`` (k,) [s] their starts.
+
+        n: the most coordinates of a level; those that a level has not are zero.
+        """
+
+    @abstractmethod
+    def values(self, times: np.ndarray, side: str, row: Callable[[LoadedLevel], np.ndarray]) -> np.ndarray:
+        """row.(xi, xi', 1) (k,) at times (k,) [s], at an event from the ``side`` "left" or "right".
+
+        row: (2 n + 1,) of a level with n coordinates.
+        """
+
+    @abstractmethod
+    def sizes(self, end: float) -> tuple[float, float]:
+        """Mean of |y|^2 [m2 kg] and largest energy [J] from the first start to ``end`` [s], of SAMPLES even instants.
+
+        The mean is that of a polygon through them; energy: kinetic and strain, without its sign.
+        """
+
+    @property
+    @abstractmethod
+    def works(self) -> tuple[float, float, float]:
+        """Work [J] of damping, of loads and stops that vary in time, and of friction."""
+
+    def integral(self, row: Callable[[LoadedLevel], np.ndarray], first: float, last: float) -> float:
+        """Integral over [first, last] [s] of row.(xi, xi', 1); row: (2 n + 1,) of a level with n coordinates."""
+        total, starts, ends = 0.0, np.maximum(self.starts, first), np.minimum(self.ends, last)
+        for number, level in enumerate(self.levels):
+            if np.any(function := row(level)):
+                places = np.flatnonzero((self.numbers == number) & (starts < ends))
+                total += self._integral(level, function, places, starts[places], ends[places]) if len(places) else 0.0
+        return total
+
+    def _integral(
+        self, level: LoadedLevel, row: np.ndarray, places: np.ndarray, starts: np.ndarray, ends: np.ndarray
+    ) -> float:
+        """The same from ``starts`` to ``ends`` in segments ``places`` (k,) of one level."""
+        given = zip(places.tolist(), starts.tolist(), ends.tolist(), strict=True)
+        return sum(self[place].integral(row, start, end) for place, start, end in given)
+
+    def owners(self, times: np.ndarray, side: str = "right") -> np.ndarray:
+        """Places (k,) of the segments that hold at times (k,) [s]."""
+        return owners(self.starts, times, side)
+
+
+class Listed(Segments):
+    """Segments that are objects."""
+
+    def __init__(self, segments: Sequence[Segment]) -> None:
+        self._segments = segments
+        self._known: dict[tuple[int, ...], tuple[int, LoadedLevel]] = {}  # by states: one may have been built anew
+        for segment in segments:
+            self._known.setdefault(segment.level.states, (len(self._known), segment.level))
+
+    @functools.cached_property
+    def levels(self) -> Sequence[LoadedLevel]:
+        """See ``Segments``."""
+        return [level for _, level in self._known.values()]
+
+    @functools.cached_property
+    def numbers(self) -> np.ndarray:
+        """See ``Segments``."""
+        return np.array([self._known[segment.level.states][0] for segment in self._segments], np.int64)
+
+    @functools.cached_property
+    def starts(self) -> np.ndarray:
+        """See ``Segments``."""
+        return np.array([segment.start for segment in self._segments])
+
+    @functools.cached_property
+    def ends(self) -> np.ndarray:
+        """See ``Segments``."""
+        return np.array([segment.end for segment in self._segments])
+
+    @property
+    def settled(self) -> np.ndarray:
+        """See ``Segments``."""
+        return np.array([all(phase is Phase.ARMED for phase in segment.phases) for segment in self._segments], bool)
+
+    def __len__(self) -> int:
+        return len(self._segments)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self._segments[index]
+
+    def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """See ``Segments``."""
+        found = np.zeros((2, len(places), max(level.width for level in self.levels)))
+        for place in np.unique(places).tolist():
+            own, segment = np.flatnonzero(places == place), self._segments[place]
+            for derivative in range(2):
+                xi = segment.modal(segment.start + after[own], derivative)
+                found[derivative, own, : len(xi)] = xi.T
+        return found
+
+    def values(self, times: np.ndarray, side: str, row: Callable[[LoadedLevel], np.ndarray]) -> np.ndarray:
+        """See ``Segments``."""
+        places, found = self.owners(times, side), np.empty(len(times))
+        x, v = self.states(places, times - self.starts[places])
+        for number in np.unique(self.numbers[places]).tolist():
+            level, own = self.levels[number], self.numbers[places] == number
+            n, function = level.width, row(level)
+            found[own] = x[own, :n] @ function[:n] + v[own, :n] @ function[n:-1] + function[-1]
+        return found
+
+    def sizes(self, end: float) -> tuple[float, float]:
+        """See ``Segments``."""
+        times = np.linspace(self.starts[0], end, SAMPLES)
+        places, squares, energies = self.owners(times), np.empty(SAMPLES), np.empty(SAMPLES)
+        states = self.states(places, times - self.starts[places])
+        for k, number in enumerate(self.numbers[places].tolist()):
+            level = self.levels[number]
+            x, v = states[:, k, : level.width]
+            squares[k] = np.sum(level.configuration(x) ** 2)
+            energies[k] = level.kinetic(v) + level.strain(x)
+        square = (np.sum(squares) - 0.5 * (squares[0] + squares[-1])) / (SAMPLES - 1)
+        return float(square), float(np.max(np.abs(energies)))
+
+    @property
+    def works(self) -> tuple[float, float, float]:
+        """See ``Segments``."""
+        damping, varying, friction = np.sum([s.works for s in self._segments], axis=0).tolist()
+        return damping, varying, friction
+
+
+def owners(starts: np.ndarray, times: np.ndarray, side: str) -> np.ndarray:
+    """Places (k,) of the segments with these starts (n,) that hold at times (k,) [s]."""
+    return np.maximum(np.searchsorted(starts, times, side="left" if side == "left" else "right") - 1, 0)
+
+
+def listed(segments: Sequence[Segment]) -> Segments:
+    """Segments as what many of them are asked for together."""
+    return segments if isinstance(segments, Segments) else Listed(segments)

@@ -1,0 +1,351 @@
+"""Histories: what can be asked of a motion in segments, of a run or of one that was saved (eq. 38.4).
+
+    x(t) = Phi_l eta(t) + x_inf,l,   eta(t) = Re V (c exp(lambda (t - t_k)))   on [t_k, t_k+1]
+
+Everything but energies is a row of (xi, xi', 1) in every level; who has the levels says which.
+"""
+
+from __future__ import annotations
+
+import functools
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from multiphi_exudyn.display import Shown
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.events.transitions.state import Event, total_impulse
+from multiphi_exudyn.mechanics.arguments import no_text
+from multiphi_exudyn.mechanics.structure import At
+from multiphi_exudyn.time.segments.segment import Segment, Segments, listed
+from multiphi_exudyn.time.trajectory.history_figure import history_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+__all__ = ["INSTANTS", "Histories"]
+
+INSTANTS = 1001  # of a history where no times are given
+
+
+class Histories(Shown, ABC):
+    """What can be asked of a motion, of a run or of one that was saved.
+
+    Times [s] are scalars or (k,); at an event ``side`` chooses the limit from the "right" (default) or the "left".
+    MultiPhiValueError and MultiPhiTypeError for a time outside of the motion, and for a name that there is not.
+    """
+
+    segments: Sequence[Segment]
+    events: Sequence[Event]
+    t_end: float
+    message: str
+
+    @property
+    @abstractmethod
+    def t_start(self) -> float:
+        """When it begins [s]."""
+
+    @property
+    @abstractmethod
+    def points(self) -> tuple[str, ...]:
+        """Names of points that histories are asked for."""
+
+    @property
+    @abstractmethod
+    def contacts(self) -> tuple[str, ...]:
+        """Names of contacts."""
+
+    @property
+    @abstractmethod
+    def frictions(self) -> tuple[str, ...]:
+        """Names of what has friction, and is no contact."""
+
+    @property
+    @abstractmethod
+    def rubbing(self) -> tuple[str, ...]:
+        """Names of contacts that have friction."""
+
+    @abstractmethod
+    def _row(self, question: str, name: At) -> Callable[[Any], np.ndarray]:
+        """A level's row (2 (r + q) + 1,) of (xi, xi', 1) for "at", "gap", "contact_force", "friction_force", "slip"."""
+
+    @abstractmethod
+    def _holds(self, question: str, name: str) -> Callable[[Any], bool]:
+        """Whether in a level a contact is closed ("contact_intervals"), or a friction sticks ("stick_intervals")."""
+
+    @abstractmethod
+    def _motion(self, level: Any, xi: np.ndarray) -> np.ndarray:
+        """Phi_l xi (n, k) of coordinates (r + q, k) or their derivatives."""
+
+    @abstractmethod
+    def _asymptotic(self, level: Any) -> np.ndarray:
+        """x_inf,l (n,) [m, rad]."""
+
+    def displacement(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
+        """x [m, rad] of all degrees of freedom: (n,) for a scalar t, (n, k) for (k,) times.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> print(1e3 * tr.displacement(0.0).round(6))  # mm
+        [2.5 5.  7.5]
+        """
+        return self._configurations(t, side, 0)
+
+    def velocity(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
+        """x' [m/s, rad/s] of all degrees of freedom: (n,) for a scalar t, (n, k) for (k,) times."""
+        return self._configurations(t, side, 1)
+
+    def acceleration(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
+        """x'' [m/s2, rad/s2] of all degrees of freedom: (n,) for a scalar t, (n, k) for (k,) times."""
+        return np.asarray(
+            self._evaluate(t, side, lambda segment, times: self._motion(segment.level, segment.modal(times, 2)))
+        )
+
+    def at(self, point: At, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
+        """Displacement [m] of a point (name, {point: coefficient} or row): a float for a scalar t, (k,) for (k,) times.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> round(1e3 * tr.at("tip", 0.0), 3)  # mm
+        7.5
+        """
+        return self._values("at", point, t, side)
+
+    def gap(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
+        """Gap [m] of a contact: a float for a scalar t, (k,) for (k,) times."""
+        return self._values("gap", contact, t, side)
+
+    def contact_force(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
+        """Contact force lambda >= 0 [N]: a float for a scalar t, (k,) for (k,) times.
+
+        Impacts of rigid contacts are impulses, not forces: ``contact_impulse``.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> force = tr.contact_force("stop", np.linspace(0.0, 0.5, 2001))
+        >>> print(f"{force.max():.0f} N")
+        484 N
+        """
+        return self._values("contact_force", contact, t, side)
+
+    def contact_impulse(self, contact: str, t0: float, t1: float) -> float:
+        """Integral of the contact force over [t0, t1] [N s], impulses of impacts in it included."""
+        row = self._row("contact_impulse", contact)
+        first, last = float(self._times(t0)[0]), float(self._times(t1)[0])
+        if first > last:
+            raise MultiPhiValueError(f"contact_impulse: got t0 = {t0!r} > t1 = {t1!r}, need t0 <= t1")
+        return self._segments.integral(row, first, last) + total_impulse(self.events, contact, first, last)
+
+    def contact_intervals(self, contact: str) -> list[tuple[float, float]]:
+        """[(closed at, opened at), ...] [s]; one still closed at the end ends at t_end, instants are left out.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> [round(t, 4) for t in tr.contact_intervals("stop")[0]]
+        [0.0197, 0.0229]
+        """
+        return self._intervals(self._holds("contact_intervals", contact))
+
+    def friction_force(self, name: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
+        """T [N] of a friction, whose force on the structure is -h T: a float for a scalar t, (k,) for (k,) times."""
+        return self._values("friction_force", name, t, side)
+
+    def slip(self, name: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
+        """How far [m] along +h the patch of a friction has moved on its counter-surface since the start.
+
+        A float, or (k,). Exact: it does not change by a bit while the patch sticks.
+        """
+        return self._values("slip", name, t, side) - self._values("slip", name, self.t_start, "right")
+
+    def stick_intervals(self, name: str) -> np.ndarray:
+        """[[sticks from, slips from], ...] (k, 2) [s]; the first may begin at the start, the last end at t_end.
+
+        Instants are left out: a block without a spring that turns sticks at one and slips on.
+        """
+        return np.array(self._intervals(self._holds("stick_intervals", name))).reshape(-1, 2)
+
+    def energy(self, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
+        """Kinetic + strain energy [J], closed compliant contacts and force laws included: a float, or (k,)."""
+        return self._evaluate(t, side, lambda segment, times: segment.energy(times))
+
+    def to_dataframe(self, points: Sequence[str] | None = None, times: np.ndarray | None = None) -> DataFrame:
+        """Histories as a pandas table: a row for each time [s], which is the index.
+
+        Columns: displacement [m] of every point by its name, of every contact "gap NAME" [m] and "force NAME" [N], of
+        what has friction "friction NAME" [N] and "slip NAME" [m].
+
+        Parameters
+        ----------
+        points : sequence of str, default None
+            Names of points, None for all of the structure's.
+        times : array (k,), default None
+            Times [s], None for 1001 that are evenly spaced.
+
+        Raises
+        ------
+        MultiPhiValueError
+            For a name or a time that there is not.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import multiphi_exudyn as mp
+        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+        >>> model = mp.MultiPhiModel(chain, [stop])
+        >>> pulled = model.static_equilibrium({"tip": 100.0})
+        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
+        >>> list(tr.to_dataframe().columns)
+        ['tip', 'gap stop', 'force stop']
+        """
+        from pandas import DataFrame, Index
+
+        at = self._shown_times(times)
+        columns = self._at_points(points, at)
+        for name in self.contacts:
+            columns |= {f"gap {name}": self.gap(name, at), f"force {name}": self.contact_force(name, at)}
+        for name in (*self.frictions, *self.rubbing):
+            columns |= {f"friction {name}": self.friction_force(name, at), f"slip {name}": self.slip(name, at)}
+        return DataFrame(columns, index=Index(at, name="time"))
+
+    def plot(self, points: Sequence[str] | None = None, times: np.ndarray | None = None) -> Figure:
+        """A matplotlib figure: displacements of points, and below them the forces of contacts and frictions.
+
+        Grey: while a contact is closed; where there are none, while friction sticks.
+
+        Parameters
+        ----------
+        points, times
+            As in ``to_dataframe``.
+        """
+        at = self._shown_times(times)
+        forces: dict[str, Any] = {name: self.contact_force(name, at) for name in self.contacts}
+        forces |= {name: self.friction_force(name, at) for name in self.frictions}
+        closed: Mapping[str, Any] = {f"{name} closed": self.contact_intervals(name) for name in self.contacts}
+        stuck = {f"{name} sticks": self.stick_intervals(name).tolist() for name in self.frictions}
+        return history_figure(at, self._at_points(points, at), forces, closed or stuck)
+
+    # ------------------------------------------------------------------ evaluation
+
+    def _shown_times(self, times: np.ndarray | None) -> np.ndarray:
+        return self._times(np.linspace(self.t_start, self.t_end, INSTANTS) if times is None else times)
+
+    def _at_points(self, points: Sequence[str] | None, times: np.ndarray) -> dict[str, Any]:
+        """Displacements (k,) [m] of points by name, of all of them for None."""
+        no_text("points", points)
+        return {name: self.at(name, times) for name in (self.points if points is None else points)}
+
+    def _intervals(self, holds: Callable[[Any], bool]) -> list[tuple[float, float]]:
+        """When a level lasts that holds [s], instants left out."""
+        intervals: list[tuple[float, float]] = []
+        own = self._segments
+        chosen = np.array([holds(level) for level in own.levels], bool)
+        places = np.flatnonzero(chosen[own.numbers] & (own.ends > own.starts)) if len(own) else np.zeros(0, np.int64)
+        for start, end in zip(own.starts[places].tolist(), own.ends[places].tolist(), strict=True):
+            if intervals and intervals[-1][1] == start:
+                intervals[-1] = (intervals[-1][0], end)
+            else:
+                intervals.append((start, end))
+        return intervals
+
+    def _configurations(self, t: float | np.ndarray, side: str, derivative: int) -> np.ndarray:
+        times = self._times(t)
+        places, segments = self._owners(times, side), self._segments
+        states = segments.states(places, times - segments.starts[places])
+        numbers, result = segments.numbers[places], np.empty((0, len(times)))
+        for number in np.unique(numbers).tolist():
+            level, own = segments.levels[number], np.flatnonzero(numbers == number)
+            x = self._motion(level, states[derivative, own, : level.width].T)
+            if not len(result):
+                result = np.empty((len(x), len(times)))
+            result[:, own] = x if derivative else x + self._asymptotic(level)[:, None]
+        return result if np.ndim(t) else result[:, 0]
+
+    def _values(self, question: str, name: At, t: float | np.ndarray, side: str) -> Any:
+        """A row of (xi, xi', 1) at times: a float, or (k,)."""
+        row = self._row(question, name)
+        found = self._segments.values(self._times(t), _side(side), row)
+        return found if np.ndim(t) else float(found[0])
+
+    def _evaluate(
+        self, t: float | np.ndarray, side: str, values: Callable[[Segment, np.ndarray], np.ndarray]
+    ) -> float | np.ndarray:
+        """``values`` of the segments that own the times, in the order of the times."""
+        times = self._times(t)
+        owner = self._owners(times, side)
+        parts = np.split(np.argsort(owner, kind="stable"), np.flatnonzero(np.diff(np.sort(owner))) + 1)
+        result: np.ndarray | None = None
+        for part in parts:
+            found = values(self.segments[owner[part[0]]], times[part])
+            if result is None:
+                result = np.empty((*found.shape[:-1], len(times)))
+            result[..., part] = found
+        assert result is not None
+        if np.ndim(t) == 0:
+            return float(result[0]) if result.ndim == 1 else result[:, 0]
+        return result
+
+    def _times(self, t: float | np.ndarray) -> np.ndarray:
+        try:
+            times = np.atleast_1d(np.asarray(t, dtype=float))
+        except (TypeError, ValueError) as error:
+            hint = f"; a point's displacement: at({t!r}, times)" if isinstance(t, str) and t in self.points else ""
+            needed = f"a time or (k,) times in s{hint}"
+            raise MultiPhiTypeError(f"t: got {type(t).__name__}, need {needed}") from error
+        if times.ndim != 1 or len(times) == 0:
+            raise MultiPhiValueError(f"t: got shape {np.shape(t)}, need a scalar or (k,)")
+        if not self.segments:
+            raise MultiPhiValueError(f"t: got a time of a run that has no motion ({self.message}), need one that began")
+        if not np.all((times >= self.t_start) & (times <= self.t_end)):
+            given = " to ".join(f"{t:g}" for t in sorted({np.min(times), np.max(times)}))
+            raise MultiPhiValueError(f"t: got {given} s, need {self.t_start:g} <= t <= {self.t_end:g} s")
+        return times
+
+    @functools.cached_property
+    def _segments(self) -> Segments:
+        return listed(self.segments)
+
+    def _owners(self, times: np.ndarray, side: str) -> np.ndarray:
+        return self._segments.owners(times, _side(side))
+
+
+def _side(side: str) -> str:
+    if side not in ("left", "right"):
+        raise MultiPhiValueError(f"side: got {side!r}, need 'left' or 'right'")
+    return side

@@ -1,0 +1,115 @@
+"""What to distrust in a model or in its levels, known before any run comes there; run_warnings.py lists the kinds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from multiphi_exudyn.display import per_cent
+from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.levels.mode_choice import CONTACT_SHARE
+from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.mechanics.damping import ModalDamping
+from multiphi_exudyn.mechanics.modal_structure import ModalStructure
+
+__all__ = ["REMEDY", "cluster_warnings", "damping_warnings", "missing_modes", "static_warnings"]
+
+PER_CENT = 0.5  # a ratio of a structure is below 0.1 mostly, and half of critical is hardly an oscillation any more
+STICKING = 8  # modes beside friction that sticks: from there on its force is right to 5 % on the rig's beam
+REMEDY = "give the model more modes, or modes=Tolerance(0.01)"
+
+
+def static_warnings(levels: Sequence[Level]) -> Iterator[str]:
+    """Of the contact of which the modes of these levels leave out most of the static flexibility."""
+    yield from _sticking(levels)
+    held = {link.name for level in levels[:1] for link in level.base.links if link.held}
+    shares = [
+        (share, name, level.modes)
+        for level in levels
+        for name, share in level.static_shares.items()
+        if name not in held
+    ]
+    share, name, modes = max(shares, default=(0.0, "", 0))
+    if share >= CONTACT_SHARE:
+        others = len({other for value, other, _ in shares if value >= CONTACT_SHARE}) - 1
+        also = f" (and at {others} more)" if others else ""
+        yield (
+            f"truncated contact: at {name!r}{also} {modes} modes leave out {per_cent(share)} of the static "
+            f"flexibility of the closed level, so peak contact forces are not to be trusted; {REMEDY}"
+        )
+
+
+def _sticking(levels: Sequence[Level]) -> Iterator[str]:
+    """Of friction that sticks in a level of few modes, which leave out much of its flexibility there."""
+    found: dict[str, int] = {}
+    for level in levels:
+        for link in (level.base.links[i] for i in level.indices if level.modes < STICKING):
+            if link.held and (link.rigid or level.static_shares.get(link.name, 0.0) >= CONTACT_SHARE):
+                found[link.name] = min(level.modes, found.get(link.name, STICKING))
+    if found:
+        names = ", ".join(repr(name) for name in found)
+        yield (
+            f"truncated friction: only {min(found.values())} modes are kept while {names} sticks, so its force may be "
+            f"off by 5 % and more until it slips; {REMEDY}"
+        )
+
+
+def damping_warnings(model: MultiPhiModel) -> Iterator[str]:
+    """Of modal ratios that end before the modes do, or look like per cent."""
+    damping = model.structure.damping
+    if not isinstance(damping, ModalDamping):
+        return
+    listed = damping.listed
+    if damping.beyond is None and 0 < len(listed) < (kept := model.level_at(()).modes):
+        yield (
+            f"undamped modes: ModalDamping lists {len(listed)} ratios and {kept} modes are kept, so modes "
+            f"{len(listed) + 1} to {kept} are undamped; give beyond={listed[-1]:g}, or beyond=0.0 if that is meant"
+        )
+    if (largest := max(listed, default=0.0)) >= PER_CENT:
+        yield (
+            f"damping ratios: {largest:g} is {100 * largest:g} % of critical damping, which looks like a "
+            "ratio in per cent; write 0.01 for 1 %"
+        )
+
+
+def missing_modes(model: MultiPhiModel) -> Iterator[str]:
+    """Of what acts on a structure of modes at points of which no static flexibility is known."""
+    structure = model.structure
+    if not isinstance(structure, ModalStructure):
+        return
+    names = [link.name for link in model.contacts]
+    places = [{at} if isinstance(at, str) else {*at} for at in (link.direction for link in model.contacts)]
+    told = dict.fromkeys(name for name, points in zip(names, places, strict=True) if not points <= structure.completed)
+    if told:
+        yield (
+            f"missing modes: the structure has only its modes up to {structure.highest:g} Hz, so "
+            f"{', '.join(map(repr, told))} acts on too stiff a structure and its peak forces are not to be trusted"
+            f"{_swinging(model, [names.index(name) for name in told], structure.highest)}; give structure_from_modes "
+            "the static flexibility of these points (flexibility=)"
+        )
+
+
+def _swinging(model: MultiPhiModel, contacts: Sequence[int], highest: float) -> str:
+    """How high above the highest mode [Hz] given modes swing on the stiffest of some contacts: sqrt(k h.M^-1 h)."""
+    k, lengths = model.base.stiffnesses[contacts], model.base.lengths[contacts]
+    swinging = np.sqrt(np.where(np.isfinite(k) & (k > 0), k, 0.0)) * lengths / (2 * math.pi)
+    most = int(np.argmax(swinging))
+    if not 0 < highest < swinging[most]:
+        return ""
+    return f" (on {k[most]:g} N/m these modes swing at up to {swinging[most]:.3g} Hz, where others would as well)"
+
+
+def cluster_warnings(levels: Sequence[Level]) -> list[str]:
+    """One sentence where some of these levels keep modes beyond those asked for."""
+    kept = [level for level in levels if level.kept_beyond]
+    if not kept:
+        return []
+    most = max(kept, key=lambda level: level.kept_beyond)
+    asked, name = most.modes - most.kept_beyond, ", ".join(most.closed) or "open"
+    return [
+        f"cluster: {len(kept)} of {len(levels)} levels keep more modes than asked for, level ({name}) {most.modes} in "
+        f"place of {asked}, as a cut between modes of one frequency ({most.frequencies[asked - 1]:.6g} Hz) would be "
+        f"arbitrary; ask for {most.modes} modes"
+    ]
