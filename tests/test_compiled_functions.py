@@ -358,7 +358,7 @@ def test_the_place_is_the_one_named_or_the_package_or_the_users_folder(monkeypat
     assert [path.parent for path in compiled_cache.cache_folders()] == [tmp_path / "cache"]
     monkeypatch.delenv("NUMBA_CACHE_DIR")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    package = Path(front.__file__).parents[1]
+    package = Path(front.__file__).parents[2]
     assert compiled_cache.cache_folders()[0] == package / "__pycache__"
     assert len(compiled_cache.cache_folders()) == 2
 

@@ -12,7 +12,8 @@ the loop of a run: arrays says what stands where, and level_arrays puts it there
     3       a rigid contact opens         switching.is_firm, switching.open_and_enter, phases.is_pulled, sticking.let_go
     4       a compliant contact changes   switching.try_wishes, switching.switch, phases.is_denied
     5       recovering                    phases.phase_of, monitoring.watch
-    6       refused, and held back        phases.update_phases, phases.hold_back, monitoring.watch, monitoring.flag_again
+    6       refused, and held back        phases.update_phases, phases.hold_back, monitoring.watch
+    6       and asked again               monitoring.flag_again
     7       a viscous contact             switching.is_relaxing
     8       a force law asks              changes.turn_wishes, changes.segment_at
     8       and changes                   switching.is_firm, decision.is_latest

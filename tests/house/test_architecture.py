@@ -17,10 +17,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 BESIDE = ("reference_models", "exudyn_plugin")  # a package beside the house, and the room after which it stands
-COMPILERS = (
-    "multiphi_exudyn/mathematics/compiling/translation.py",
-    "multiphi_exudyn/mathematics/compiling/machine_code.py",
-)
+COMPILERS = tuple(f"multiphi_exudyn/mathematics/compiling/{name}.py" for name in ("translation", "machine_code"))
 HEAVY = {
     "exudyn": ("multiphi_exudyn/exudyn_plugin", "reference_models"),
     "matplotlib": (

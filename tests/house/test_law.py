@@ -5,6 +5,7 @@ import importlib
 import inspect
 import pkgutil
 import re
+from types import ModuleType
 
 import pytest
 
@@ -35,15 +36,23 @@ def table(room: object) -> dict[str, set[str]]:
 
 
 @functools.cache
+def modules(room: ModuleType) -> dict[str, ModuleType]:
+    """The files of a room and of the rooms in it, by their own names, of which there is one each."""
+    names = [info.name for info in pkgutil.walk_packages(room.__path__, f"{room.__name__}.") if not info.ispkg]
+    found = {name.rpartition(".")[2]: importlib.import_module(name) for name in names}
+    assert len(found) == len(names)
+    return found
+
+
+@functools.cache
 def numbered() -> dict[str, set[str]]:
     """The functions of the room of events whose docstrings begin with the number of a sentence."""
     found: dict[str, set[str]] = {number: set() for number in SENTENCES}
-    for module in pkgutil.iter_modules(events.__path__):
-        code = importlib.import_module(f"{events.__name__}.{module.name}")
+    for module, code in modules(events).items():
         for name, function in inspect.getmembers(code, inspect.isfunction):
             said = NUMBERS.match(doc(function))
             for number in said[1].split(", ") if said and function.__module__ == code.__name__ else ():
-                found[number].add(f"{module.name}.{name}")
+                found[number].add(f"{module}.{name}")
     return found
 
 
@@ -65,4 +74,4 @@ def test_equations_stand_where_they_are_said_to(room):
         assert found
         for place in found:
             module, *names = place.split(".")
-            functools.reduce(getattr, names, importlib.import_module(f"{room.__name__}.{module}"))
+            functools.reduce(getattr, names, modules(room)[module])

@@ -119,7 +119,7 @@ def begin(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 
 @compiled
 def enter_start(ints: Ints, numbers: Numbers) -> None:
-    """GIVEN becomes the START-th of the starts that stand in the arrays (start_arrays.py), w and w' what they are now."""
+    """GIVEN becomes the START-th of the starts in the arrays (start_arrays.py), w and w' what they are now."""
     m, q, elements, here = ints[COORDINATES], ints[PRESCRIBED], ints[ELEMENTS], ints[ints[GIVEN + LEVEL] + STATES]
     held, place, speed = ints[CHANNELS] - q, ints[GIVEN + PLACE], ints[GIVEN + SPEED]
     start = ints[STARTS] + ints[START] * (2 * m + held + 1)

@@ -22,7 +22,7 @@ __all__ = ["Kept", "cache_folders", "file_name", "keep", "kept", "writable_folde
 
 Kept = dict[str, tuple[str, bytes]]  # symbol: (digest, object file)
 
-PACKAGE = Path(__file__).parents[1]
+PACKAGE = Path(__file__).parents[2]
 HASH_SIZE = 32  # bytes
 SETTINGS = ("CPU_NAME", "CPU_FEATURES", "ENABLE_AVX")  # NUMBA_...
 LAYOUT = 2  # of the file, and of how functions call one another: another number for another one

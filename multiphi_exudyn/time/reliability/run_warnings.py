@@ -7,7 +7,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "truncated friction: ..." levels in which friction sticks with few modes: its force there is off
     "backward slip: ..."      truncated friction that moves against its slip (friction_warnings.py)
     "redundant friction: ..." which of several bears the load, and when they slip, is not unique (friction_warnings.py)
-    "friction in turn: ..."   rigid contacts that rub and turn at one instant, whose order may count (friction_warnings.py)
+    "friction in turn: ..."   rigid contacts that rub and turn at one instant in an order (friction_warnings.py)
     "several impacts: ..."    an impact with friction to which Coulomb's law has several answers (impact_warnings.py)
     "lost energy: ..."        what truncation took of the largest energy of the run (truncation_warnings.py)
     "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held
