@@ -398,7 +398,7 @@ def test_without_numba_an_entry_is_the_plain_function(monkeypatch):
 
 IN_A_PROCESS = """
 import sys, numpy as np
-from multiphi_exudyn.mathematics import compiled
+from multiphi_exudyn.mathematics.compiling import compiled
 compiled._entries.clear()
 sys.path.insert(0, {folder!r})
 from program import run
@@ -447,7 +447,7 @@ def test_the_command_line_compiles_ahead_and_says_where(monkeypatch, capsys):
 def test_the_command_line_compiles_what_runs_samples_ledgers_and_coupled_bodies_need():
     code = """
 from multiphi_exudyn.cli import compile_command
-from multiphi_exudyn.mathematics import compiled
+from multiphi_exudyn.mathematics.compiling import compiled
 print(*sorted(one.function.__name__ for one in compiled._entries))
 """
     names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()

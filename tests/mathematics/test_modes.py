@@ -14,7 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from multiphi_exudyn import Beam, Clamp, MultiPhiValueError, NumericalFailure, Section, mathematics, planar_beam
+from multiphi_exudyn import Beam, Clamp, MultiPhiValueError, NumericalFailure, Section, planar_beam
+from multiphi_exudyn.mathematics.eigenproblems import lowest_modes as lowest
 from multiphi_exudyn.mathematics.eigenproblems.lowest_modes import _Lowest, lowest_modes
 from multiphi_exudyn.mathematics.eigenproblems.modes import complete_modes, right_singular_vectors
 
@@ -193,7 +194,7 @@ class TestLowestModes:
         mass, stiffness = (scipy.sparse.block_diag([m] * copies, format="csr") for m in chain(60, ends=2))
         exact = lowest_modes(mass, stiffness, 3 * copies, np.zeros((0, 60 * copies))).modes
         first = exact.shapes[:, :copies]
-        monkeypatch.setattr(mathematics.lowest_modes, "lanczos", lambda *given: seen_of(first, exact.omega[0], given))
+        monkeypatch.setattr(lowest, "lanczos", lambda *given: seen_of(first, exact.omega[0], given))
         found = lowest_modes(mass, stiffness, 1, np.zeros((0, 60 * copies)))
         assert found.exact == copies
         assert_allclose(found.modes.omega, exact.omega[0], rtol=1e-11)
