@@ -19,7 +19,7 @@ from multiphi_exudyn.mathematics.eigenproblems.modes import Modes, complete_mode
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.element import AnyLink, Element, Link, link_places, links_of
+from multiphi_exudyn.mechanics.element import AnyLink, Element, Link, link_indices, links_of
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["build_base"]
@@ -98,7 +98,7 @@ def _samples(stiffness: np.ndarray, modes: int) -> list[HeldRows]:
 
 def _largest_stiffness(contacts: Sequence[Element], same: np.ndarray) -> float:
     """The largest stiffness [N/m] that an element has in one of its states in the direction of these links."""
-    links, places = links_of(contacts), link_places(contacts)
+    links, places = links_of(contacts), link_indices(contacts)
     found = [
         sum(links[own[k]].stiffness for k in state.holds if own[k] in same)
         for element, own in zip(contacts, places, strict=True)

@@ -122,7 +122,7 @@ class ModalBase(ElementTable, Shown):
 
     def pressing(self, element: int) -> dict[int, int]:
         """The links of an element that have no held place, and the sign of their directions to its own."""
-        places = [k for k in self.link_places[element] if not self.links[k].held]
+        places = [k for k in self.link_indices[element] if not self.links[k].held]
         return {k: int(self.direction_signs[k] * self.direction_signs[element]) for k in places}
 
     @functools.cached_property

@@ -161,7 +161,7 @@ def _alone(base: ModalBase) -> list[tuple[int, ...]]:
 
 def _stiffest(base: ModalBase, law: int) -> tuple[int, ...]:
     """The links that hold in the stiffest segment of a force law."""
-    places = base.link_places[law]
+    places = base.link_indices[law]
     segments = [tuple(places[k] for k in state.holds) for state in base.laws[law].states]
     return max(segments, key=lambda links: float(np.sum(base.stiffnesses[list(links)])))
 

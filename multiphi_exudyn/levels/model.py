@@ -207,7 +207,7 @@ class MultiPhiModel(SharedBase, Shown):
             For a name or a state that there is not.
         """
         if isinstance(closed, Mapping):
-            return self.level_at(self.links_held(self.states_named(closed)))
+            return self.level_at(self.active_links(self.states_named(closed)))
         if isinstance(closed, str) or not isinstance(closed, Iterable):
             raise MultiPhiTypeError(f"closed: got {closed!r}, need a tuple of contact names, or {{name: state}}")
         return self.level_at(self.links_named(closed))

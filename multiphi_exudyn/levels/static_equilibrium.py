@@ -84,7 +84,7 @@ class _Standing:
 
     def closed(self, base: ModalBase) -> list[int]:
         """The links that hold."""
-        given = enumerate(base.link_places)
+        given = enumerate(base.link_indices)
         return sorted(places[k] for i, places in given for k in self.of(base, i).holds)
 
 
@@ -155,7 +155,7 @@ def equilibrium(base: ModalBase, load: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 def _first_state(base: ModalBase, element: int) -> int:
     """The state of an element where nothing has moved yet."""
-    given, still = base.contacts[element], [0.0] * len(base.link_places[element])
+    given, still = base.contacts[element], [0.0] * len(base.link_indices[element])
     return [state.name for state in given.states].index(given.first_state(base.gaps[element], *still))
 
 
@@ -164,7 +164,7 @@ def _next_change(base: ModalBase, standing: _Standing, path: _Path, s: float) ->
     found: tuple[float, int, int] | None = None
     for i, element in enumerate(base.contacts):
         for exit_ in standing.of(base, i).exits:
-            ends, size = path.signal(base.link_places[i], exit_, standing.held, s)
+            ends, size = path.signal(base.link_indices[i], exit_, standing.held, s)
             fall = ends[0] - ends[1]
             if fall > SLACK * size:
                 at = s + max(float(path.at(s, ends)), 0.0) / fall
@@ -194,18 +194,20 @@ def _enter(base: ModalBase, standing: _Standing, path: _Path, s: float, element:
 
 def _held_link(base: ModalBase, element: int) -> int | None:
     """The link of an element that has a held place."""
-    return next((k for k in base.link_places[element] if base.links[k].held), None)
+    return next((k for k in base.link_indices[element] if base.links[k].held), None)
 
 
 def _holds(base: ModalBase, element: int, state: ElementState, link: int) -> bool:
-    return base.link_places[element].index(link) in state.holds
+    return base.link_indices[element].index(link) in state.holds
 
 
 def _sliding_force(base: ModalBase, element: int, state: ElementState, path: _Path, s: float) -> float:
     """T [N] of friction that slips, at s."""
     if state.rubs is None:
         return -state.push
-    normal = [k for k in base.link_places[element] if not base.links[k].held]  # one of them holds, the others have none
+    normal = [
+        k for k in base.link_indices[element] if not base.links[k].held
+    ]  # one of them holds, the others have none
     return float(state.rubs[1] * path.at(s, np.sum(path.forces[:, normal], axis=1)))
 
 
@@ -225,7 +227,7 @@ def _lasts(base: ModalBase, standing: _Standing, path: _Path, s: float, element:
     """
     state = standing.of(base, element)
     for exit_ in state.exits:
-        ends, size = path.signal(base.link_places[element], exit_, standing.held, s)
+        ends, size = path.signal(base.link_indices[element], exit_, standing.held, s)
         falls = ends[0] - ends[1] > SLACK * size
         turns_back = exit_.asked == left or "open" in (state.name, exit_.asked)
         slides_back = not asked and path.at(s, ends) <= SLACK * size

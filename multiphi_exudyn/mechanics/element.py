@@ -57,7 +57,7 @@ __all__ = [
     "event_kind",
     "friction_spring",
     "is_oblique",
-    "link_places",
+    "link_indices",
     "links_of",
 ]
 
@@ -189,7 +189,7 @@ def links_of(elements: Sequence[Element]) -> tuple[AnyLink, ...]:
     return (*elements, *(link for element in elements for link in element.further))
 
 
-def link_places(elements: Sequence[Element]) -> tuple[tuple[int, ...], ...]:
+def link_indices(elements: Sequence[Element]) -> tuple[tuple[int, ...], ...]:
     """Indices of every element's links among all links."""
     indices, end = [], len(elements)
     for i, element in enumerate(elements):

@@ -10,7 +10,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import one_of
-from multiphi_exudyn.mechanics.element import AnyLink, Element, is_oblique, link_places, links_of
+from multiphi_exudyn.mechanics.element import AnyLink, Element, is_oblique, link_indices, links_of
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 
 __all__ = ["ElementTable"]
@@ -34,9 +34,9 @@ class ElementTable:
         return links_of(self.contacts)
 
     @functools.cached_property
-    def link_places(self) -> tuple[tuple[int, ...], ...]:
+    def link_indices(self) -> tuple[tuple[int, ...], ...]:
         """Indices of every element's links among all links (c,)."""
-        return link_places(self.contacts)
+        return link_indices(self.contacts)
 
     @functools.cached_property
     def held(self) -> tuple[int, ...]:
@@ -56,12 +56,12 @@ class ElementTable:
     @functools.cached_property
     def rubbing(self) -> tuple[int, ...]:
         """Indices of the elements with friction, that is with a link that has a stick position."""
-        return tuple(i for i, indices in enumerate(self.link_places) if not set(indices).isdisjoint(self.held))
+        return tuple(i for i, indices in enumerate(self.link_indices) if not set(indices).isdisjoint(self.held))
 
     @functools.cached_property
     def oblique(self) -> dict[int, int]:
         """Links whose force has another direction than the link, with the first link of their element."""
-        pairs = ((k, indices[0]) for indices in self.link_places for k in indices[1:])
+        pairs = ((k, indices[0]) for indices in self.link_indices for k in indices[1:])
         return {k: first for k, first in pairs if is_oblique(self.links[k])}
 
     @functools.cached_property
@@ -91,7 +91,7 @@ class ElementTable:
 
     def label(self, link: int) -> str:
         """Name of a link; that of its element for links of force laws and of sliding contacts."""
-        element = next(i for i, indices in enumerate(self.link_places) if link in indices)
+        element = next(i for i, indices in enumerate(self.link_indices) if link in indices)
         has_element_name = element in self.laws or link in self.oblique
         return self.links[element if has_element_name else link].name
 
@@ -100,7 +100,7 @@ class ElementTable:
 
         They have the gap of its first link. For a force law: the links that act in other segments than "0".
         """
-        first, *further = self.link_places[element]
+        first, *further = self.link_indices[element]
         if element in self.laws:
             return further
         return [first, *(k for k in further if k in self.oblique)]
@@ -128,7 +128,7 @@ class ElementTable:
             states[i] = possible.index(state)
         return tuple(states)
 
-    def links_held(self, states: Sequence[int]) -> tuple[int, ...]:
+    def active_links(self, states: Sequence[int]) -> tuple[int, ...]:
         """Indices of the links that act with the elements in these states; they determine the modes."""
         active = zip(self._active_links, states, strict=True)
         return tuple(sorted(link for by_state, state in active for link in by_state[state]))
@@ -136,7 +136,7 @@ class ElementTable:
     @functools.cached_property
     def _active_links(self) -> list[list[list[int]]]:
         """Indices of the links that act, for every element and each of its states."""
-        pairs = zip(self.contacts, self.link_places, strict=True)
+        pairs = zip(self.contacts, self.link_indices, strict=True)
         return [[[indices[k] for k in state.holds] for state in contact.states] for contact, indices in pairs]
 
     @functools.cached_property
@@ -150,7 +150,7 @@ class ElementTable:
         return bool(self.held) or any(any(pushes) for pushes in self.pushes_of_states)
 
     @functools.cached_property
-    def struck_alone(self) -> np.ndarray:
+    def frictionless_rigid_contacts(self) -> np.ndarray:
         """Indices of the rigid contacts in a model without friction, where an impulse has a contact's own direction."""
         has_friction = any(element.further or element.held for element in self.contacts)
         return np.array([i for i, element in enumerate(self.contacts) if element.rigid and not has_friction], int)

@@ -178,7 +178,7 @@ class ForceLaw:
         return len(self.states)
 
     @property
-    def knots_beside(self) -> tuple[int, int]:
+    def knot_counts(self) -> tuple[int, int]:
         """Numbers of knots with a change of slope, above segment "0" and below it."""
         return len(self._above), len(self._below)
 

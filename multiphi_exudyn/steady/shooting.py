@@ -147,7 +147,7 @@ class Shooting:
         """Indices of the unknowns: all coordinates except stick positions of links that acted always, or never."""
         model = self.map.model
         levels = [self._state.level, *trajectory.segments.levels]
-        active = [model.links_held(level.states) for level in levels]
+        active = [model.active_links(level.states) for level in levels]
         constant = [len({i in held for held in active}) == 1 for i in model.held]
         return np.flatnonzero(np.append(np.ones(len(self._scales) - len(constant), bool), ~np.array(constant, bool)))
 

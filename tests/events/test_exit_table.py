@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 import multiphi_exudyn as mp
 from multiphi_exudyn.events.transitions.exit_table import ExitTable
 from multiphi_exudyn.events.transitions.exits import ExitShares
-from multiphi_exudyn.mechanics.element import link_places
+from multiphi_exudyn.mechanics.element import link_indices
 
 ELEMENTS = [
     mp.UnilateralContact("soft", "p", 1e-3, 1e4),
@@ -22,7 +22,7 @@ ELEMENTS = [
 
 @pytest.mark.parametrize("states", list(itertools.product(*(range(len(each.states)) for each in ELEMENTS))))
 def test_is_what_the_elements_say_in_every_level(states):
-    table, places = ExitTable(ELEMENTS), link_places(ELEMENTS)
+    table, places = ExitTable(ELEMENTS), link_indices(ELEMENTS)
     given = [(i, exit_) for i, state in enumerate(states) for exit_ in ELEMENTS[i].states[state].exits]
     kept = table.of(states)
     found, expected = table.shares(kept), ExitShares.of(places, given)

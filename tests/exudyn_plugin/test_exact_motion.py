@@ -44,7 +44,7 @@ def held(model, row, force):
     in_base = row[None, :] @ model.base.modes.shapes
 
     def acting(states):
-        level = model.level_at(model.links_held(states))
+        level = model.level_at(model.active_links(states))
         rows = in_base @ level.vectors
         return LevelForces(force * rows[0], force * _direct_reactions(level, in_base, rows)[:, 0])
 
@@ -134,7 +134,7 @@ def test_bodies_that_take_turns_move_as_each_one_alone(case):
         motion = Run(model, T_END, None, velocity).begun()
         in_base = row[None, :] @ model.base.modes.shapes
         attached = AttachedInertia(np.array([[0.7]]), np.eye(1))
-        rows_in = lambda states: in_base @ model.level_at(model.links_held(states)).vectors  # noqa: E731
+        rows_in = lambda states: in_base @ model.level_at(model.active_links(states)).vectors  # noqa: E731
         inertia = PointInertia(attached, model.base, in_base, rows_in)
         exact, state = ExactMotion(motion, motion.levels, "body", 0.0), motion.static_state
         for k in range(30):

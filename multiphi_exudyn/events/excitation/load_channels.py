@@ -84,7 +84,7 @@ class LoadChannels:
         fixed = self._no_stop()
         for name in load.fixed_stops:
             self._check_stop(name)
-            for k in self._model.link_places[self._model.index(name)]:
+            for k in self._model.link_indices[self._model.index(name)]:
                 fixed[k] = -float(structure.row(self._model.links[k].direction) @ moved)
         if np.any(fixed):
             self._check_smooth(fixed, load.course)

@@ -265,13 +265,13 @@ class LoadedLevel(Shown):
         own, rubs = self.level, self.level.base.contacts[element].states[self.states[element]].rubs
         if rubs is None:
             return np.zeros(own.modes), np.zeros(own.modes), 0.0
-        k = own.indices.index(own.base.link_places[element][rubs[0]])
+        k = own.indices.index(own.base.link_indices[element][rubs[0]])
         return rubs[1] * own.force_rows[k], rubs[1] * own.force_rate_rows[k], rubs[1] * self.asymptotic.forces[k]
 
     def stretch(self, element: int) -> tuple[np.ndarray, float]:
         """What an element's held link keeps of its stretch [m] while it does not hold: row.xi + constant."""
         base, (row, _, constant) = self.level.base, self.rubbing(element)
-        held = next(k for k in base.link_places[element] if base.links[k].held)
+        held = next(k for k in base.link_indices[element] if base.links[k].held)
         stretch = base.contacts[element].states[self.states[element]].stretch
         return row / base.stiffnesses[held], stretch + constant / base.stiffnesses[held]
 
@@ -290,7 +290,7 @@ class LoadedLevel(Shown):
         if not self.rubbing_elements:
             return np.zeros((0, self.level.modes + 1))
         for i in self.rubbing_elements:
-            stiffness = next(base.stiffnesses[k] for k in base.link_places[i] if base.links[k].held)
+            stiffness = next(base.stiffnesses[k] for k in base.link_indices[i] if base.links[k].held)
             if np.isfinite(stiffness):
                 rows.append(np.sqrt(stiffness) * np.append(*self.stretch(i)))
         return np.array(rows).reshape(-1, self.level.modes + 1)

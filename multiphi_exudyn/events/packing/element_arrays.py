@@ -29,7 +29,7 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
     segments = np.zeros((c, 3), int)
     for i, law in base.laws.items():
         if law.further:
-            segments[i] = base.link_places[i][1], *law.knots_beside
+            segments[i] = base.link_indices[i][1], *law.knot_counts
     limits, rubs = np.zeros((2, c)), np.zeros((2, c))
     for i, element in enumerate(model.contacts):
         if isinstance(element, Friction) and element.rigid:
@@ -65,7 +65,7 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
 def _frictions(buffers: Buffers, model: MultiPhiModel) -> dict[int, int]:
     """What the elements with a held link do with its spring."""
     found = np.array([friction_spring(element) for element in model.contacts]).reshape(-1, 4)
-    places = [links[int(row[1])] for links, row in zip(model.link_places, found, strict=True)]
+    places = [links[int(row[1])] for links, row in zip(model.link_indices, found, strict=True)]
     return {
         a.STICKS: buffers.put("ints", found[:, 0]),
         a.HELD_LINKS: buffers.put("ints", places),

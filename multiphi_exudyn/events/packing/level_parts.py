@@ -90,7 +90,7 @@ def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
     constant -= worked[:, slides] @ level.asymptotic.forces[slides]
     pairs = []
     for i in level.rubbing_elements:
-        held = next(k for k in base.link_places[i] if base.links[k].held)
+        held = next(k for k in base.link_indices[i] if base.links[k].held)
         (place, rate, still), moves = level.rubbing(i), level.excitation.stops[held]
         pairs.append(np.concatenate([place, rate, own.speed_rows[held], own.gap_rows[held], [still]]))
         placed -= np.outer(moves, place)

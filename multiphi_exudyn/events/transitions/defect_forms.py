@@ -105,7 +105,7 @@ def struck_defects(level: LoadedLevel) -> np.ndarray:
     where contacts rub: their impulse has another direction.
     """
     own, base = level.level, level.level.base
-    found, rigid = np.full(len(base.contacts), np.nan), base.struck_alone
+    found, rigid = np.full(len(base.contacts), np.nan), base.frictionless_rigid_contacts
     if not len(rigid):
         return found
     held, given = held_rigidly(level), base.directions[:, rigid]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from multiphi_exudyn.events.transitions.exits import ExitShares
-from multiphi_exudyn.mechanics.element import Element, Exit, link_places
+from multiphi_exudyn.mechanics.element import Element, Exit, link_indices
 
 __all__ = ["ExitTable"]
 
@@ -32,7 +32,7 @@ class ExitTable:
         self._exits = [exit_ for _, _, exit_ in given]
         self._turns = [k for k, exit_ in enumerate(self._exits) if exit_.turn is not None]
         self._states = np.array([state for _, state, _ in given], int)
-        self._shares = ExitShares.of(link_places(elements), [(i, exit_) for i, _, exit_ in given])
+        self._shares = ExitShares.of(link_indices(elements), [(i, exit_) for i, _, exit_ in given])
         numbers = [{state.name: number for number, state in enumerate(element.states)} for element in elements]
         described = [(i, numbers[i][exit_.asked], exit_.firmness) for i, _, exit_ in given]
         self.described = np.array(described, int).reshape(-1, 3)

@@ -74,7 +74,7 @@ def signal_row(level: LoadedLevel, element: int, exit_: Exit) -> Row:
 
 def signal_table(level: LoadedLevel, exits: Sequence[tuple[int, Exit]]) -> np.ndarray:
     """s of exits of elements in a level, rows (e, 2 n + 1) of (xi, xi', 1)."""
-    return signals_of(level, ExitShares.of(level.level.base.link_places, exits))
+    return signals_of(level, ExitShares.of(level.level.base.link_indices, exits))
 
 
 def rows_of(table: np.ndarray) -> list[Row]:
@@ -97,12 +97,12 @@ class ExitShares:
     further: tuple[np.ndarray, np.ndarray, np.ndarray]
 
     @classmethod
-    def of(cls, link_places: Sequence[Sequence[int]], exits: Sequence[tuple[int, Exit]]) -> ExitShares:
+    def of(cls, link_indices: Sequence[Sequence[int]], exits: Sequence[tuple[int, Exit]]) -> ExitShares:
         """Of exits with the positions of their elements."""
-        links = np.array([link_places[element][0] for element, _ in exits], int)
+        links = np.array([link_indices[element][0] for element, _ in exits], int)
         shares = np.array([exit_.shares[0][1:] for _, exit_ in exits], float).reshape(-1, 3)
         given = [
-            (k, link_places[element][share.link], *share[1:])
+            (k, link_indices[element][share.link], *share[1:])
             for k, (element, exit_) in enumerate(exits)
             for share in exit_.further
         ]
@@ -164,7 +164,7 @@ def _linked(level: LoadedLevel, links: np.ndarray, shares: np.ndarray) -> tuple[
 
 def force_shares(level: LoadedLevel, element: int, exit_: Exit) -> list[tuple[int, float]]:
     """Of the forces of links that hold in a level, by their places among these, what counts in an exit's signal."""
-    links, places = level.level.base.link_places[element], level.level.indices
+    links, places = level.level.base.link_indices[element], level.level.indices
     return [(places.index(links[share.link]), share.force) for share in exit_.shares if share.force]
 
 

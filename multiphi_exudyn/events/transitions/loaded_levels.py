@@ -156,7 +156,7 @@ class LoadedLevels:
         return self._pushed.get_or_build(states, lambda: self._made(states))
 
     def _made(self, states: tuple[int, ...]) -> LoadedLevel:
-        level = self.model.level_at(self.model.links_held(states))
+        level = self.model.level_at(self.model.active_links(states))
         if self.model.general:
             return LoadedLevel.of(level, self.load + self.model.push(states), states, lasting=self.lasting)
         return LoadedLevel.of(level, self.load, states, self.excitation, self.lasting)

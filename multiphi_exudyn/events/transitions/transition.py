@@ -106,7 +106,7 @@ class Transition:
         places = {link: k for k, link in enumerate(base.held, start=excitation.prescribed)}
         if not places:
             return rows, constants
-        for i, (element, links) in enumerate(zip(base.contacts, base.link_places, strict=True)):
+        for i, (element, links) in enumerate(zip(base.contacts, base.link_indices, strict=True)):
             before, after = element.states[source.states[i]], element.states[self.target.states[i]]
             for number, link in enumerate(links):
                 if link in places and number in after.holds and number not in before.holds:

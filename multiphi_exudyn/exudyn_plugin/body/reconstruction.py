@@ -61,6 +61,6 @@ def reconstruct(
 def _direct_share(loaded: LoadedLevel, element: int, direct_reactions: np.ndarray, held: bool) -> np.ndarray:
     """Sum of the reactions L f (k, ..) of the links of an element with (``held``) or without stick position."""
     base, indices = loaded.level.base, loaded.level.indices
-    signs = {k: 1 for k in base.link_places[element] if base.links[k].held} if held else base.pressing(element)
+    signs = {k: 1 for k in base.link_indices[element] if base.links[k].held} if held else base.pressing(element)
     shares = [sign * direct_reactions[indices.index(link)] for link, sign in signs.items() if link in indices]
     return np.asarray(sum(shares, np.zeros(direct_reactions.shape[1])))

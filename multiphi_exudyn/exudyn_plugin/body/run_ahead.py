@@ -1,7 +1,7 @@
 """Run ahead: a run of an isolated body, whose exact motion is computed ahead of Exudyn's steps.
 
-At the end of an event step (event_steps.py) the exact state is written, with the matrices of its level. Between event steps
-Exudyn's own steps need nothing of the body; it only compares the time with ``next_time``.
+At the end of an event step (event_steps.py) the exact state is written, with the matrices of its level. Between event
+steps Exudyn's own steps need nothing of the body; it only compares the time with ``next_time``.
 
 Event steps are planned many steps ahead, for the present step size. Where a step ends at another time than planned, the
 plan is made anew, so any step size gives right results. At every event step Exudyn's coordinates are compared with

@@ -128,7 +128,7 @@ class Reactions:
         """Pushes (b,) of elements, and the forces (m,) on points that they cause."""
         push, base = level.alone.excitation.static - level.excitation.static, self._base
         for i in level.rubbing_elements:
-            link = next(k for k in base.link_places[i] if k in base.oblique and k in level.level.indices)
+            link = next(k for k in base.link_indices[i] if k in base.oblique and k in level.level.indices)
             push = push + (base.pushes[:, link] - base.directions[:, link]) * self._pressures[i]
         return push, self._attached.reactions(self._rows, push)
 

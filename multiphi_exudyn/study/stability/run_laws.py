@@ -188,8 +188,8 @@ def _signals(
     for segment in segments:
         phases = iter(segment.phases)
         for contact, element in enumerate(run.model.contacts):
-            link, state = run.model.link_places[contact][0], segment.level.states[contact]
-            if len(run.model.link_places[contact]) > 1:  # a contact with friction: brute force judges it
+            link, state = run.model.link_indices[contact][0], segment.level.states[contact]
+            if len(run.model.link_indices[contact]) > 1:  # a contact with friction: brute force judges it
                 list(itertools.islice(phases, len(element.states[state].exits)))
                 continue
             for made in _of(element, link in segment.level.level.indices, state):

@@ -3,9 +3,9 @@
     the energy lost of the largest energy of the run, whatever its sign at an instant
     the indicator of the motion: sqrt( sum of |defect|^2 / mean of |y|^2 )                    (truncation.py)
 
-Each is zero where it is too small to be told, and not a number where somebody has still to look: for the size of the
-motion where the loop has not (motion_size.py), for a defect that it does not know. The thresholds are calibrated on random
-truncated models judged by the same with all modes: tests/campaign/truncation_study.py.
+Each is zero where it is too small for a warning, and not a number where it is not known yet: the size of the motion,
+where the loop has not summed it (motion_size.py), or a defect. The thresholds are calibrated on random truncated models
+that are compared with all modes: tests/campaign/truncation_study.py.
 """
 
 from __future__ import annotations

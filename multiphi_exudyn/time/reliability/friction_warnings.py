@@ -88,7 +88,7 @@ def _rigid_friction(segments: Segments) -> list[_Rub]:
         sticks, number, spring, drop = friction_spring(element)
         if sticks >= 0 and not spring:
             pressed, gives_way = element.rigid and not element.held, not (element.rigid or element.held)
-            found.append(_Rub(i, element.name, base.link_places[i][number], sticks, drop, pressed, gives_way))
+            found.append(_Rub(i, element.name, base.link_indices[i][number], sticks, drop, pressed, gives_way))
     return found
 
 
@@ -110,7 +110,7 @@ def _together(level: LoadedLevel, one: _Rub, other: _Rub) -> Iterator[tuple[floa
     alone = np.linalg.norm(row - rows @ shares) > INDEPENDENT * np.linalg.norm(row)
     if slides or alone or abs(shares[-1]) <= INDEPENDENT:
         return
-    owners = {k: i for i, places in enumerate(base.link_places) for k in places}
+    owners = {k: i for i, places in enumerate(base.link_indices) for k in places}
     taken = [owners[k] for k, share in zip(held, shares, strict=True) if abs(share) > INDEPENDENT]
     yield math.sqrt(1.0 - one.drop), one.name, tuple(dict.fromkeys(base.contacts[k].name for k in taken))
 

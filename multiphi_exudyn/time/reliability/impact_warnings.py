@@ -87,7 +87,7 @@ def _impacts(trajectory: Trajectory) -> Iterator[_Impact]:
     touches[instants, table[:, 1].astype(int)] = True
     for k, time in enumerate(times.tolist()):
         touching = tuple(np.flatnonzero(touches[k]).tolist())
-        links = [model.base.link_places[i][:2] for i in touching]
+        links = [model.base.link_indices[i][:2] for i in touching]
         found = np.array([[speeds[k, own[0]], speeds[k, own[-1]] if len(own) > 1 else 0.0] for own in links])
         yield _Impact(time, segments.levels[numbers[k]], touching, found)
 
@@ -108,6 +108,6 @@ def _coulomb(model: MultiPhiModel, impact: _Impact, mu: np.ndarray) -> CoulombIm
     """The problem of those that touch in the level in which nothing rigid holds."""
     base = model.base
     rows = model.level_at(tuple(k for k in impact.level.level.indices if not base.links[k].rigid)).gap_rows
-    links = [base.link_places[i][:2] for i in impact.touching]
+    links = [base.link_indices[i][:2] for i in impact.touching]
     found = [[rows[own[0]], rows[own[-1]] if len(own) > 1 else np.zeros_like(rows[own[0]])] for own in links]
     return CoulombImpact(np.array(found), mu[list(impact.touching)])

@@ -120,7 +120,7 @@ def _in_touch(
                 "(static_equilibrium gives an admissible start)"
             )
         depth = 0.0 if abs(gaps[i]) <= near[i] else gaps[i]
-        named = contact.first_state(depth, *rates[list(model.link_places[i])].tolist())
+        named = contact.first_state(depth, *rates[list(model.link_indices[i])].tolist())
         states[i] = [state.name for state in contact.states].index(named)
         if contact.rigid and not contact.held and gaps[i] <= near[i]:
             states[i] = CLOSE
@@ -129,7 +129,7 @@ def _in_touch(
     held = np.array([gaps[i] - stretches.get(model.links[i].name, 0.0) for i in model.held])
     left = scales.stops.copy()
     left[list(model.held)] -= held
-    sprung = tuple(k for k in model.links_held(states.tolist()) if k not in touching)
+    sprung = tuple(k for k in model.active_links(states.tolist()) if k not in touching)
     return Start(y, v, sprung, touching, left, tuple(states.tolist()), held)
 
 
@@ -139,7 +139,7 @@ def _independent(model: MultiPhiModel, states: np.ndarray) -> np.ndarray:
     for i, element in enumerate(model.contacts):
         sticks, number, spring, _ = friction_spring(element)
         if states[i] == sticks and spring == 0 and (element.held or not element.rigid):
-            row = model.base.directions[:, model.link_places[i][number]]
+            row = model.base.directions[:, model.link_indices[i][number]]
             left = row / np.linalg.norm(row)
             for _ in range(2):
                 left = left - (found @ left) @ found

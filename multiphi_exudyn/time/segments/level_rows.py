@@ -66,7 +66,7 @@ def pressing_row(element: int, level: LoadedLevel) -> np.ndarray:
 def _held_link(level: LoadedLevel, element: int) -> int:
     """The link of an element that has a held place."""
     base = level.level.base
-    return next(k for k in base.link_places[element] if base.links[k].held)
+    return next(k for k in base.link_indices[element] if base.links[k].held)
 
 
 def _link_row(level: LoadedLevel, link: int) -> np.ndarray:

@@ -60,7 +60,7 @@ def _rubbing(
     """T (k,) of friction that goes with other forces, the speed (k,) on which it works, and s (q,) of its surface."""
     own, base = level.level, level.level.base
     for i in level.rubbing_elements:
-        held = next(k for k in base.link_places[i] if base.links[k].held)
+        held = next(k for k in base.link_indices[i] if base.links[k].held)
         place, rate, constant = level.rubbing(i)
         yield place @ xi + rate @ xi_t + constant, own.gap_rows[held] @ xi_t, level.excitation.stops[held]
 

@@ -66,7 +66,7 @@ class ModelHistories(Histories):
 
     def _holds(self, question: str, name: str) -> Callable[[LoadedLevel], bool]:
         if question == "stick_intervals":
-            places = self.model.link_places[self._friction(question, name)]
+            places = self.model.link_indices[self._friction(question, name)]
             links = [k for k in places if self.model.links[k].held]
         else:
             links = self.model.pressing_links(self._contact(question, name))
@@ -90,6 +90,6 @@ class ModelHistories(Histories):
     def _friction(self, question: str, name: str) -> int:
         """Position of a friction."""
         i = self.model.index(name)
-        if not any(self.model.links[k].held for k in self.model.link_places[i]):
+        if not any(self.model.links[k].held for k in self.model.link_indices[i]):
             raise MultiPhiValueError(f"{question}: got {name!r}, which has no friction, need the name of one that has")
         return i
