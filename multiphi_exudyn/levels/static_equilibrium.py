@@ -205,9 +205,7 @@ def _sliding_force(base: ModalBase, element: int, state: ElementState, path: _Pa
     """T [N] of friction that slips, at s."""
     if state.rubs is None:
         return -state.push
-    normal = [
-        k for k in base.link_indices[element] if not base.links[k].held
-    ]  # one holds, the others have none
+    normal = [k for k in base.link_indices[element] if not base.links[k].held]  # one holds, the others have none
     return float(state.rubs[1] * path.at(s, np.sum(path.forces[:, normal], axis=1)))
 
 

@@ -5,16 +5,18 @@ They know the trajectory's analytic segments and nothing of how events were foun
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from multiphi_exudyn.events.transitions.state import Phase
+from multiphi_exudyn.events.transitions.state import Phase, total_loss
 from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.study.stability.run_signals import Signal
 from multiphi_exudyn.time.segments.segment import Segment
+from multiphi_exudyn.time.trajectory.ledger import Ledger
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["complaints", "ends_of", "energy_rise", "largest_energy", "missed", "still"]
@@ -115,20 +117,50 @@ def _potential(segment: Segment) -> float:
     return max(abs(segment.level.asymptotic.potential), abs(segment.level.potential(start)))
 
 
+def _ledger_of_trajectory(run: Trajectory) -> Ledger:
+    """The ledger with the energies of the first and the last state, and with the losses of the events.
+
+    The run's own ledger has them from sums of the loop: both agree where the loop has summed what it tells.
+    """
+    assert run.final is not None, "a run with segments has a final state"
+    losses = run.start_loss + total_loss(run.events)
+    return dataclasses.replace(
+        run.ledger,
+        initial=_start_energy(run),
+        impact=losses.impact,
+        truncation_kinetic=losses.truncation_kinetic,
+        truncation_strain=losses.truncation_strain,
+        final=run.final.level.energy(run.final.displacement, run.final.velocity),
+    )
+
+
+def _start_energy(run: Trajectory) -> float:
+    """Kinetic and strain energy [J] at the start, before anything has happened there."""
+    start, base = run.start, run.model.base
+    if start.state is not None:
+        return start.state.level.energy(start.state.displacement, start.state.velocity)
+    gaps = base.gaps_at(start.displacement, start.gaps) if start.penetrating else start.gaps
+    kinetic = 0.5 * float(start.velocity @ start.velocity)
+    return kinetic + float(base.strain(start.displacement, start.penetrating, gaps))
+
+
 def ledger(run: Trajectory, scale: float) -> str | None:
     """It closes; impact, damping, friction and kinetic truncation take energy; without truncation no strain is lost.
+
+    So does that of the trajectory's own states and events, which shares with it only the works within segments.
 
     The strain row alone may be negative, and only in a truncated basis: an instant that leaves a gap which is not
     zero can stretch the spring of the level that it enters.
     """
-    found = run.ledger
+    found = _ledger_of_trajectory(run)
     rows = {"impact": found.impact, "truncation_kinetic": found.truncation_kinetic, "damping": found.damping}
     rows["friction"] = found.friction
     for name, value in rows.items():
         if not value >= -CLOSES * scale:
             return f"ledger: {name} {value:g} of {scale:g} J"
-    if not abs(found.residual) <= (RUBBED if run.model.rubbing else CLOSES) * scale:
-        return f"ledger: residual {found.residual:g} of {scale:g} J"
+    for residual in (found.residual, run.ledger.residual):
+        if not abs(residual) <= (RUBBED if run.model.rubbing else CLOSES) * scale:
+            return f"ledger: residual {residual:g} of {scale:g} J"
     if not abs(found.truncation_strain) + abs(found.truncation_kinetic) <= NO_TRUNCATION * scale and _complete(run):
         return f"ledger: truncation {found.truncation_strain:g}, {found.truncation_kinetic:g} of {scale:g} J"
     return None
