@@ -453,12 +453,14 @@ print(*sorted(one.function.__name__ for one in compiled._entries))
     names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert names == [
         "advance",
+        "bend_one",
+        "clear",
         "describe_basis",
         "improve",
         "integrate",
         "integrate_works",
         "is_far",
-        "is_whole",
+        "level_hash",
         "measure",
         "roots",
         "sample_rows",
