@@ -6,7 +6,8 @@ of a run: arrays documents their layout, and level_arrays fills them. Where each
 
     (38.3)  eta'' of a state              state_arrays.accelerate
     (38.6)  a state in another level      maps.move; its matrices transition.Transition
-    1       armed, and requesting         phases.phase_of, monitoring.watch, monitoring.who_asks, decision.decide_jump
+    1       armed                         phases.phase_of, monitoring.watch
+    1       requesting a change           monitoring.who_asks, decision.decide_jump
     2       rigid contacts that strike    striking.impact, impact.collide, striking.close_without_impact
     2       those at rest after it        resting.list_resting, resting.find_pressed, resting.drop_pulled
     2       redundant ones                redundancy.keep_independent

@@ -61,7 +61,7 @@ __all__ = [
     "row_speed",
 ]
 
-BRIEF = 1e-12  # of the time so far: a shorter bounce is the last
+BRIEF = 1e-12  # relative to the time so far: a shorter bounce is the last
 
 
 @compiled

@@ -169,8 +169,8 @@ from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, TAKEN_FALLING, TAKEN
 
 __all__ = ["ROUNDS", "decide", "decide_jump"]
 
-MOST_RETURNS = 3  # changes of an element from or to a state at an instant, from which on it stays there
-ROUNDS = 20  # of decisions at one instant: above it the contacts exclude each other's states for ever
+MOST_RETURNS = 3  # changes of an element from or to a state at an instant; after more it keeps its state
+ROUNDS = 20  # decisions at one instant: with more the contacts exclude each other's states without end
 
 
 @compiled
@@ -260,7 +260,7 @@ def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
                     if ints[pending + i] == OPEN and is_closed_rigid(ints, WORKED, i) == 1:
                         ints[freed + i] = 1
             status = apply_requests(ints, numbers, waves, pending)
-        elif refusals == 2:  # treated before: what others did at this instant took its reaction away
+        elif refusals == 2:  # treated before: changes of others at this instant have removed its reaction
             status = switch(ints, numbers, waves, ints[PULLING])
         else:
             hold_back(ints, WORKED)
@@ -351,7 +351,9 @@ def apply_requests(ints: Ints, numbers: Numbers, waves: Waves, requests: int) ->
         requested = ints[states + i] if ints[requests + i] == NO_REQUEST else ints[requests + i]
         ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else requested
         sticks = ints[ints[STICKS] + i]
-        if bears_no_impulse(ints, numbers, i) == 1 and ints[ints[COMPLIANT_KEY] + i] >= sticks:  # slips, either way
+        if (
+            bears_no_impulse(ints, numbers, i) == 1 and ints[ints[COMPLIANT_KEY] + i] >= sticks
+        ):  # slips, in either direction
             begins = ints[states + i] == sticks and requested > sticks
             ints[ints[COMPLIANT_KEY] + i] = requested if begins else max(ints[states + i], sticks + 1)
     if strikes == 0:

@@ -86,7 +86,7 @@ def begin(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else ints[states + i]
         sticks = ints[ints[STICKS] + i]
         if touching > 0 and bears_no_impulse(ints, numbers, i) == 1 and ints[ints[COMPLIANT_KEY] + i] >= sticks:
-            ints[ints[COMPLIANT_KEY] + i] = max(ints[states + i], sticks + 1)  # in slip, either way
+            ints[ints[COMPLIANT_KEY] + i] = max(ints[states + i], sticks + 1)  # slips, in either direction
         ints[ints[STRIKING] + i] = ints[states + i] if rigid else OPEN
         ints[ints[FREED] + i] = 0
         ints[ints[ASKING] + i] = NO_REQUEST

@@ -133,7 +133,7 @@ def pose_friction_problem(ints: Ints, numbers: Numbers, count: int, requests: in
         limit, static_limit = normal * numbers[ints[LIMITS] + i], normal * numbers[ints[STATIC_LIMITS] + i]
         force_of_slip = slip_force(ints, i, limit)
         low, high = force_of_slip - static_limit, force_of_slip + static_limit
-        if static_limit <= limit and at_limit(ints, numbers, i, ints[requests + i]) == 1:  # and rises
+        if static_limit <= limit and at_limit(ints, numbers, i, ints[requests + i]) == 1:  # the force would exceed it
             low = force_of_slip - limit if ints[requests + i] == forward else force_of_slip + limit
             high = low
         numbers[ints[LOWEST] + k] = low

@@ -60,8 +60,8 @@ from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = ["IMMOVABLE", "RESTING", "add_friction_rows", "collide", "fill_rows", "least_change"]
 
-RESTING = 1e-12  # of what it could be at such speeds: a gap velocity below it is zero right after an impact
-IMMOVABLE = 1e-11  # of a contact's mobility: below it what hangs on the structure holds the contact
+RESTING = 1e-12  # relative to its possible size at such velocities: a smaller gap velocity after an impact is zero
+IMMOVABLE = 1e-11  # of a contact's mobility: below it attached bodies prevent any motion of the contact
 
 
 @compiled

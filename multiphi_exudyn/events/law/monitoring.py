@@ -95,10 +95,9 @@ def wait_for(
     rate: int,
     asks: int,
 ) -> int:
-    """List the signal of an exit, or the signal ``entered``, times ``sign``, or its rate; return count + 1.
+    """List the signal of an exit, or the one ``entered``, times ``sign``, or its rate; count + 1.
 
-    A signal that starts below zero by round-off, a reaction by that of the last transition, is set to start at zero:
-    the decision before has judged it as zero.
+    What begins below zero by round-off, a reaction by that of the transition before, begins at zero: so it was judged.
     """
     level = ints[CURRENT + LEVEL]
     signal = entered if entered > 0 else ints[level + EXITS] + exit_number * EXIT_INTS + SIGNAL

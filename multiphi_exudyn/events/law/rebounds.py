@@ -58,7 +58,7 @@ from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDE
 
 __all__ = ["clear_last_bounces", "collide_and_rebound", "flag_touching", "repeat_impacts", "set_rebound_speeds"]
 
-BLOWS = 100  # at one instant, of contacts that drive each other back to their stops
+BLOWS = 100  # impacts at one instant of contacts that drive each other back to their stops
 
 
 @compiled

@@ -98,7 +98,7 @@ def impact(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     same = same_speed(ints, numbers, RELEASED, STRUCK)
     if same == 1:
         for k in range(count):
-            numbers[ints[IMPULSES] + k] = 0.0  # round-off of them: nothing was struck
+            numbers[ints[IMPULSES] + k] = 0.0  # round-off: no contact was struck
     closed = find_pressed(ints, numbers, waves, count)
     last = last_bounce(ints, numbers, count) if bouncing > 0 and closed >= 0 else 0
     if last < 0:
