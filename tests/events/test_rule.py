@@ -101,7 +101,7 @@ def test_a_rigid_contact_does_not_wait_for_its_reaction_to_rise_to_zero(seed, da
     assert min(np.min(run.contact_force(contact.name, t)) for contact in m.contacts) >= -1e-9
 
 
-def test_a_refused_contact_asks_only_where_it_may_close():
+def test_a_refused_contact_requests_a_change_only_where_it_may_close():
     """80 of 122 modes: the reaction of the level to enter is round-off of terms 1e9 times as large."""
     m = MultiPhiModel(planar_beam(rig_beam(), elements=57), [rig_contact()], modes=80)
     x = m.static_equilibrium({"node3": 1.0})

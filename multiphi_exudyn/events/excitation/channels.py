@@ -1,10 +1,10 @@
-"""Channels: what a level makes of what varies, as prescribed coordinates xi = (eta, w) (eqs. 38.4 to 38.6).
+"""Channels of a level: its response to the time-varying loads and stops, as prescribed coordinates (eqs. 38.4 to 38.6).
 
     x = Psi eta + y_inf + R w,   R w = (K_l^-1 - Psi omega^-2 Psi^T) (b w + k h s w)  +  Y w
 
-w (q,) the channels, b and s their patterns and stops (excitation.py). The first part is the quasi-static deflection of
-the modes left out (its inertia is neglected, its strain and the work of the load on it are not). Y holds the motion of
-rigid stops, the static shapes of eq. (38.5) with x_k(t); it has inertia:
+xi = (eta, w), w (q,) the channels, b and s their patterns and stops (excitation.py). The first part is the quasi-static
+response of the modes left out: their inertia is neglected, their strain and the work of the load on them are not. Y
+holds the motion due to rigid stops, the static shapes of eq. (38.5) with x_k(t); it has inertia:
 
     eta'' + D eta' + omega^2 eta = P w + Q w',   P = Psi^T (b + k h s),   on w' as a channel of its own
                                                  P = Psi^T (c h s - C Y),   Q = -Psi^T Y
@@ -30,10 +30,10 @@ __all__ = ["Channels"]
 
 @dataclass(frozen=True)
 class Channels:
-    """What a level makes of the channels of an excitation.
+    """Forces, shapes and contact forces of a level due to the channels of an excitation.
 
-    force, force_rate: P, Q (r, q). carried: Y (m, q). shapes: R (m, q), of which terms (m, q) they are the sum.
-    contact_force, contact_force_rate: forces (k, q) of the closed contacts at w = 1 and w' = 1.
+    force, force_rate: P, Q (r, q). carried: Y (m, q). shapes: R (m, q); terms (m, q): the sizes of the terms R is a sum
+    of. contact_force, contact_force_rate: forces (k, q) of the closed contacts at w = 1 and w' = 1.
     """
 
     force: np.ndarray
@@ -46,12 +46,12 @@ class Channels:
 
     @classmethod
     def none(cls, level: Level) -> Channels:
-        """Of a level under static loads alone."""
+        """Return the channels of a level under static loads alone: there are none."""
         return _none(level.modes, level.base.modes.count, len(level.indices))
 
     @classmethod
     def of(cls, level: Level, excitation: Excitation) -> Channels:
-        """Of a level under an excitation; contacts that slide have the friction that goes with their forces."""
+        """Return the channels of a level under an excitation, with the friction that sliding contacts add to them."""
         if not isinstance(level, SlidingLevel):
             return cls._of(level, excitation, level)
         plain = cls._of(level.plain, excitation, level)
@@ -65,28 +65,32 @@ class Channels:
         )
 
     @classmethod
-    def _of(cls, level: Level, excitation: Excitation, still: Level) -> Channels:
-        """Of a level without friction; still: the one whose state of rest is meant where channels are constant."""
+    def _of(cls, level: Level, excitation: Excitation, static_level: Level) -> Channels:
+        """Return the channels of a level without friction.
+
+        static_level: its static response is that to constant channels.
+        """
         base, index = level.base, list(level.indices)
         rigid = np.isinf(base.stiffnesses[index])
         stops, directions = excitation.stops[index], base.directions[:, index]
         springs = np.where(rigid, 0.0, base.stiffnesses[index])
         pushed = directions @ (springs[:, None] * stops)
         force = level.vectors.T @ (excitation.patterns + pushed)
-        loaded, forces_loaded = _beyond(level, excitation.patterns)
+        loaded, forces_loaded = _quasi_static_parts(level, excitation.patterns)
         sizes = np.linalg.norm(excitation.patterns, axis=0) / np.linalg.norm(directions, axis=0)[:, None]
         forces_loaded = np.where(rigid[:, None], drop_round_off(forces_loaded, sizes), forces_loaded)
         unloaded = np.zeros_like(excitation.patterns)
-        moved, forces_moved = _at_rest(level, unloaded, -stops)
-        if still is not level:
+        moved, forces_moved = _static_responses(level, unloaded, -stops)
+        if static_level is not level:
             constant = slice(excitation.prescribed, None)
-            moved[:, constant], forces_moved[:, constant] = _at_rest(still, unloaded[:, constant], -stops[:, constant])
-        carried, _ = _at_rest(level, unloaded, np.where(rigid[:, None], -stops, 0.0))
+            part = _static_responses(static_level, unloaded[:, constant], -stops[:, constant])
+            moved[:, constant], forces_moved[:, constant] = part
+        carried, _ = _static_responses(level, unloaded, np.where(rigid[:, None], -stops, 0.0))
         centre = _centre(force, level.computed)
-        loaded = drop_round_off(loaded, np.abs(level.vectors) @ np.abs(centre))  # of all modes nothing is left out
+        loaded = drop_round_off(loaded, np.abs(level.vectors) @ np.abs(centre))  # zero if the level has all modes
         modal = centre - _centre(force, level.squares) - _centre(level.vectors.T @ pushed, level.computed)
-        held = slice(excitation.prescribed, None)  # constant: motion is centred on the whole static response to them
-        force[:, held], modal[:, held] = 0.0, 0.0
+        constant = slice(excitation.prescribed, None)  # motion is centred on the whole static response to these
+        force[:, constant], modal[:, constant] = 0.0, 0.0
         shapes = loaded + moved + level.vectors @ modal
         contact_force = forces_loaded + forces_moved + level.force_rows @ modal
         rate, contact_rate = np.zeros_like(force), np.zeros_like(contact_force)
@@ -104,15 +108,18 @@ class Channels:
         return cls(force, rate, carried, shapes, terms, contact_force, contact_rate)
 
     def extended(self, level: Level, stops: np.ndarray) -> Level:
-        """The level in the coordinates xi = (eta, w) (r + q); squares and damping are zero on w. stops: s (c, q)."""
+        """Return the level in the coordinates xi = (eta, w) (r + q); stops: s (c, q).
+
+        Squares and damping are zero on w.
+        """
         directions, sizes = level.base.directions.T, level.base.magnitudes[0].T
         gap_columns, speeds = directions @ self.shapes - stops, directions @ self.carried - stops
-        held = level.following[:, None]  # the channels move these by round-off only
+        held = level.following[:, None]  # rows of redundant gaps: channels move these by round-off only
         moved, slack = np.abs(stops), FOLLOWING / ZERO
         gap_columns = np.where(held, drop_round_off(gap_columns, slack * (sizes @ self.terms + moved)), gap_columns)
         speeds = np.where(held, drop_round_off(speeds, slack * (sizes @ np.abs(self.carried) + moved)), speeds)
         closed = [i for i in level.indices if np.isinf(level.base.stiffnesses[i])]
-        fixed = held & ~np.any(stops[closed], axis=0)  # by contacts whose stops such a channel does not move
+        fixed = held & ~np.any(stops[closed], axis=0)  # by contacts whose stops the channel does not move
         gap_columns, speeds = np.where(fixed, -stops, gap_columns), np.where(fixed, -stops, speeds)
         q = self.force.shape[1]
         return Level(
@@ -145,22 +152,22 @@ def _centre(force: np.ndarray, squares: np.ndarray) -> np.ndarray:
     return np.divide(force, squares[:, None], out=np.zeros_like(force), where=squares[:, None] != 0)
 
 
-def _at_rest(level: Level, loads: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Configurations (m, q) and contact forces (k, q) under loads (m, q), the closed contacts with gaps (k, q)."""
+def _static_responses(level: Level, loads: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return static responses (m, q) and contact forces (k, q) to loads (m, q) and gaps (k, q) of closed contacts."""
     configurations, forces = np.zeros_like(loads), np.zeros_like(gaps)
     for k in np.flatnonzero(np.any(loads, axis=0) | np.any(gaps, axis=0)).tolist():
         forces[:, k], configurations[:, k] = level.static_response(loads[:, k], gaps[:, k])
     return configurations, forces
 
 
-def _beyond(level: Level, patterns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Configurations (m, q) and contact forces (k, q) of loads at rest, without the part of the level's modes.
+def _quasi_static_parts(level: Level, patterns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return static responses (m, q) and contact forces (k, q) to loads, without the part in the level's modes.
 
-    (K_l^-1 - Psi omega^-2 Psi^T) b as K_l^-1 (1 - Psi Psi^T) b: where a kept mode is soft, both terms of the former
-    are large. What is left of its part is round-off.
+    (K_l^-1 - Psi omega^-2 Psi^T) b is computed as K_l^-1 (1 - Psi Psi^T) b: if a kept mode is soft, both terms of the
+    former are large. The remaining part in the modes is round-off, and is removed.
     """
     psi = level.vectors
-    left = patterns - psi @ (psi.T @ patterns)
-    y, forces = _at_rest(level, left, np.zeros((len(level.indices), left.shape[1])))
+    remainder = patterns - psi @ (psi.T @ patterns)
+    y, forces = _static_responses(level, remainder, np.zeros((len(level.indices), remainder.shape[1])))
     part = psi.T @ y
     return y - psi @ part, forces - level.force_rows @ part

@@ -1,8 +1,9 @@
-"""Load channels: what the loads and moving supports of a run give to its channels, one load after the other.
+"""Load channels: the channels of the loads and moving supports of a run, added one load after the other.
 
     load          f = ... + b w        moving stop   g = h.x + gap - s w        moving base   both
 
-(excitation.py). What a channel cannot be is refused here: a rigid contact's stop that jumps, a law that is to move.
+(excitation.py). Motions that no channel can represent are refused here: jumps of a rigid contact's stop, and motions of
+a force law.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ from multiphi_exudyn.mechanics.samples import Sampled
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.time_functions import TimeFunction
 
-__all__ = ["LoadChannels", "called", "columns", "static_load"]
+__all__ = ["LoadChannels", "columns", "load_label", "static_load"]
 
 
 class LoadChannels:
-    """Loads as channels, one after the other."""
+    """The channels of loads, added one load after the other."""
 
     def __init__(self, model: MultiPhiModel, end: float, finer: float) -> None:
         self._model, self._end, self._finer = model, end, finer
@@ -34,11 +35,11 @@ class LoadChannels:
         self.stops: list[np.ndarray] = []
         self.histories: list[PiecewiseExponential] = []
         self.rate_of: list[int] = []
-        self.called = ""  # the load that is added
+        self.label = ""  # name of the present load in messages
         self.steady = -1  # the channel that is always one
 
     def add(self, load: Load) -> None:
-        """One load's channels; static loads have none."""
+        """Add the channels of a load; static loads have none."""
         if isinstance(load, VaryingLoad):
             self._append(self._row(load.at), self._no_stop(), self._history(load.course))
         elif isinstance(load, StopMotion):
@@ -46,9 +47,9 @@ class LoadChannels:
             stop = self._no_stop()
             stop[self._model.pressing_links(self._model.index(load.contact))] = 1.0
             self._check_smooth(stop, load.course)
-            self._move(stop, self._history(load.course))
+            self._add_stop_motion(stop, self._history(load.course))
         elif isinstance(load, BaseMotion):
-            self._shake(load)
+            self._add_base_motion(load)
         elif not isinstance(load, (ConstantLoad, Gravity)):
             raise MultiPhiTypeError(
                 f"loads: got {type(load).__name__}, need ConstantLoad, Gravity, HarmonicLoad, SampledLoad, "
@@ -56,15 +57,15 @@ class LoadChannels:
             )
 
     def add_surfaces(self) -> None:
-        """Counter-surfaces that move, each with its constant speed, are one channel: the time."""
+        """Add one channel, the time, for counter-surfaces that move with constant speeds."""
         speeds = np.array([link.velocity for link in self._model.links])
         if np.any(speeds):
-            self._move(speeds, PiecewiseExponential.line(1.0))
+            self._add_stop_motion(speeds, PiecewiseExponential.line(1.0))
 
     def add_static(self, load: np.ndarray) -> None:
-        """Constant loads (m,); those that pull at damped rigid-body motion are a channel too, and what friction pushes.
+        """Set the constant loads (m,), as a channel if they act on damped rigid-body modes or friction forces may.
 
-        Its free response reads p t / d - p (1 - exp(-d t)) / d^2, which loses round-off / (d t)^2 for little damping d;
+        The free response reads p t / d - p (1 - exp(-d t)) / d^2, which loses round-off / (d t)^2 for small damping d;
         the response to a channel does not.
         """
         base, self.static = self._model.base, load
@@ -74,28 +75,28 @@ class LoadChannels:
             self._append(load, self._no_stop(), PiecewiseExponential.constant(1.0))
             self.static = np.zeros_like(load)
 
-    def _shake(self, load: BaseMotion) -> None:
-        """Inertia of the moving frame, and the stops that do not move with it."""
+    def _add_base_motion(self, load: BaseMotion) -> None:
+        """Add the inertia forces of the moving frame, and the stops that do not move with it."""
         structure = self._model.structure
-        moved = structure.row(load.direction)
-        inertia = -self._model.base.modal_load(structure.mass @ moved)
+        direction = structure.row(load.direction)
+        inertia = -self._model.base.modal_load(structure.mass @ direction)
         self._check_continuous(self._history(load.course), "of the base", speed=True)
         self._append(inertia, self._no_stop(), load.course.acceleration(self._end, self._finer))
         fixed = self._no_stop()
         for name in load.fixed_stops:
             self._check_stop(name)
             for k in self._model.link_indices[self._model.index(name)]:
-                fixed[k] = -float(structure.row(self._model.links[k].direction) @ moved)
+                fixed[k] = -float(structure.row(self._model.links[k].direction) @ direction)
         if np.any(fixed):
             self._check_smooth(fixed, load.course)
-            self._move(fixed, self._history(load.course))
+            self._add_stop_motion(fixed, self._history(load.course))
 
     def _check_stop(self, name: str) -> None:
         if isinstance(self._model.contacts[self._model.index(name)], ForceLaw):
             raise MultiPhiTypeError(f"stop motion of {name!r}: got a force law, need a contact")
 
     def _check_smooth(self, stop: np.ndarray, course: TimeFunction) -> None:
-        """Refuse samples where they move a rigid contact's stop."""
+        """Refuse samples as the motion of a rigid contact's stop."""
         rigid = [link.name for link, moves in zip(self._model.links, stop, strict=True) if moves and link.rigid]
         if rigid and isinstance(course, Sampled):
             raise MultiPhiTypeError(
@@ -103,8 +104,8 @@ class LoadChannels:
                 "or Sweep"
             )
 
-    def _move(self, stop: np.ndarray, history: PiecewiseExponential) -> None:
-        """Stops that move by their entries of (c,) times a history."""
+    def _add_stop_motion(self, stop: np.ndarray, history: PiecewiseExponential) -> None:
+        """Add the motion of stops: their entries of (c,) times a history."""
         nothing = np.zeros(self._model.base.modes.count)
         self._append(nothing, stop, history)
         moving = [link for link, moves in zip(self._model.links, stop, strict=True) if moves]
@@ -115,14 +116,14 @@ class LoadChannels:
             self.rate_of[-1] = len(self.histories)
             self._append(nothing, self._no_stop(), history.derivative)
 
-    def _check_continuous(self, history: PiecewiseExponential, of: str, speed: bool) -> None:
-        """Refuse a motion that jumps, or whose speed does."""
+    def _check_continuous(self, history: PiecewiseExponential, owner: str, speed: bool) -> None:
+        """Refuse a motion with jumps of its position, or of its speed."""
         rate = history.derivative.jump_times(history.error) if speed else np.zeros(0)
         for what, times in (("position", history.jump_times()), ("speed", rate)):
             jumps = times[(times > 0) & (times < self._end)]
             if len(jumps):
                 raise MultiPhiValueError(
-                    f"{self.called}: got a motion {of} whose {what} jumps at t = {jumps[0]:.9g} s, need a {what} "
+                    f"{self.label}: got a motion {owner} whose {what} jumps at t = {jumps[0]:.9g} s, need a {what} "
                     "without jumps"
                 )
 
@@ -139,22 +140,22 @@ class LoadChannels:
         return np.zeros(len(self._model.links))
 
     def _history(self, course: TimeFunction) -> PiecewiseExponential:
-        """The course of the load that is added; what is wrong with it is told with the load's name."""
+        """Return the history of the present load's time function; errors name the load."""
         try:
             return course.history(self._end, self._finer)
         except MultiPhiError as error:
-            raise type(error)(f"{self.called}: {error}") from error
+            raise type(error)(f"{self.label}: {error}") from error
 
 
-def called(number: int, load: Load) -> str:
-    """How errors call a load."""
+def load_label(number: int, load: Load) -> str:
+    """Return the name of a load in error messages."""
     place = getattr(load, "at", getattr(load, "contact", None))
-    named = f" at {place!r}" if isinstance(place, (str, dict)) else ""
-    return f"loads[{number}] ({type(load).__name__}{named})"
+    at = f" at {place!r}" if isinstance(place, (str, dict)) else ""
+    return f"loads[{number}] ({type(load).__name__}{at})"
 
 
 def static_load(model: MultiPhiModel, loads: Sequence[Load]) -> np.ndarray:
-    """The constant loads among ``loads``, (m,) in base coordinates."""
+    """Return the sum of the constant loads among ``loads``, (m,) in base coordinates."""
     rows = [load.row(model.structure) for load in loads if isinstance(load, (ConstantLoad, Gravity))]
     if not rows:
         return np.zeros(model.base.modes.count)
@@ -162,5 +163,5 @@ def static_load(model: MultiPhiModel, loads: Sequence[Load]) -> np.ndarray:
 
 
 def columns(vectors: list[np.ndarray], length: int) -> np.ndarray:
-    """Vectors (length,) side by side, (length, 0) where there are none."""
+    """Return vectors (length,) side by side, (length, 0) if there are none."""
     return np.array(vectors).reshape(len(vectors), length).T

@@ -1,8 +1,8 @@
 """Loaded level: a level under the loads of one run, in the coordinates xi = (eta, w), with its energies.
 
-    x = Psi eta + y_inf + R w        w (q,) what varies, q >= 0 (channels.py)
+    x = Psi eta + y_inf + R w        w (q,) the channels, q >= 0 (channels.py)
 
-In xi rows, maps between levels, events and energies are those of a level under static loads, with q more columns.
+In xi the rows, maps between levels, events and energies are those of a level under static loads, with q more columns.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class StrainForm:
     constant: float
 
     def __call__(self, xi: np.ndarray) -> np.ndarray:
-        """Of (n,) or of every column of (n, k)."""
+        """Return the strain energy [J] of xi (n,), or of every column of (n, k)."""
         stretched = self.rows.dot(xi).T + self.offsets
         return np.asarray(0.5 * (stretched * stretched).dot(self.weights) + self.linear.dot(xi) + self.constant)
 
@@ -50,7 +50,8 @@ class StrainForm:
 class PotentialForm:
     """constant + linear . xi + 1/2 squares . eta^2 + w . rows[:, :r] eta + 1/2 w . rows[:, r:] w; rows (q, r + q).
 
-    And 1/2 |follows (xi, 1)|^2 (s, r + q + 1), of springs whose stretch goes with the force of a link.
+    To this adds 1/2 |follows (xi, 1)|^2, follows (s, r + q + 1): the energy of tangential springs whose stretch is
+    proportional to the force of a link, as in slip.
     """
 
     constant: float
@@ -75,12 +76,12 @@ class PotentialForm:
 class LoadedLevel(Shown):
     """A level under static and varying loads, in the coordinates xi = (eta, w) (r + q,).
 
-    level: in xi, without channels as it is. asymptotic: where its motion is centred while w = 0. gap_constants: gaps
-    (c,) of all contacts at xi = 0. excitation: of the run; channels: what the level makes of it.
-    static: the level under its static loads alone, None where that is this one. own_states: numbers of its elements'
-    states, None where they are what the closed contacts say. stored: strain energy [J] of links that keep a stretch and
-    do not hold. entries: what is kept of this level and of the ways into it (exits.py, defects.py); of levels
-    that differ by their histories alone it is the same. lasting: the longest time [s] that a motion in it takes.
+    level: in xi, unchanged without channels. asymptotic: the equilibrium about which it moves while w = 0.
+    gap_constants: gaps (c,) of all contacts at xi = 0. excitation: of the run. channels: the level's response to it.
+    static: the level under its static loads alone, None if that is this one. own_states: numbers of its elements'
+    states, None if they follow from the closed contacts. stored: strain energy [J] of links that keep a stretch without
+    holding. entries: values kept with this level and with the maps into it (exits.py, defects.py), shared by levels
+    that differ by their histories alone. lasting: the longest duration [s] of a motion in it.
     """
 
     level: Level
@@ -108,35 +109,36 @@ class LoadedLevel(Shown):
         excitation: Excitation | None = None,
         lasting: float = math.inf,
     ) -> LoadedLevel:
-        """``level`` under a static load (m,) in base coordinates, its elements in these states.
+        """Return ``level`` under a static load (m,) in base coordinates, its elements in these states.
 
-        excitation: of this load alone, None for one of its own. lasting: for motions of that time [s] at most.
+        excitation: of this load alone, None to make one. lasting: the longest duration [s] of a motion.
         """
-        rest = level.asymptotic(load)
+        equilibrium = level.asymptotic(load)
         magnitudes, initial = level.base.magnitudes
-        terms = initial + np.abs(rest.configuration) @ magnitudes
+        terms = initial + np.abs(equilibrium.configuration) @ magnitudes
         if level.following.any():
             terms[level.following] *= FOLLOWING / ZERO
-        gaps = drop_round_off(rest.gaps, terms)
+        gaps = drop_round_off(equilibrium.gaps, terms)
         constant = excitation or Excitation.constant(load, len(gaps))
-        return cls(level, rest, gaps, constant, Channels.none(level), own_states=states, lasting=lasting)
+        return cls(level, equilibrium, gaps, constant, Channels.none(level), own_states=states, lasting=lasting)
 
     def under(self, excitation: Excitation) -> LoadedLevel:
-        """This one with the channels of an excitation; the last one is kept for other histories of these channels."""
+        """Return this level with the channels of an excitation; the last result is kept for other histories."""
         kept: LoadedLevel | None = self.entries.get("under")
         if kept is None or kept.excitation.shape != excitation.shape:
             kept = self.entries["under"] = self._under(excitation)
         return replace(kept, excitation=excitation)
 
     def _under(self, excitation: Excitation) -> LoadedLevel:
-        channels, rest = Channels.of(self.level, excitation), self.asymptotic
+        channels, equilibrium = Channels.of(self.level, excitation), self.asymptotic
         if excitation.steady >= 0:
             force = channels.force.copy()
-            force[:, excitation.steady] += rest.drive
-            channels, rest = replace(channels, force=force), replace(rest, drive=np.zeros_like(rest.drive))
+            force[:, excitation.steady] += equilibrium.drive
+            channels = replace(channels, force=force)
+            equilibrium = replace(equilibrium, drive=np.zeros_like(equilibrium.drive))
         return LoadedLevel(
             level=channels.extended(self.level, excitation.stops),
-            asymptotic=rest,
+            asymptotic=equilibrium,
             gap_constants=self.gap_constants,
             excitation=excitation,
             channels=channels,
@@ -175,28 +177,28 @@ class LoadedLevel(Shown):
 
     @functools.cached_property
     def pushes(self) -> np.ndarray:
-        """Constant forces (l,) [N] of its elements along their links' directions: of the first ones."""
+        """Constant forces (l,) [N] of its elements along the directions of their first links."""
         base = self.level.base
         given = [pushed[state] for pushed, state in zip(base.pushes_of_states, self.states, strict=True)]
         return np.array([*given, *[0.0] * (len(base.links) - len(given))])
 
     @functools.cached_property
     def driven(self) -> bool:
-        """Whether a static load that is no channel drives zero-frequency modes."""
+        """Whether a static load that is not a channel acts on zero-frequency modes."""
         return bool(self.asymptotic.drive.any())
 
     def split(self, xi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """eta (r, ...) and w (q, ...) of xi."""
+        """Return eta (r, ...) and w (q, ...) of xi."""
         r = self.modal.modes
         return xi[:r], xi[r:]
 
     def motion(self, velocity: np.ndarray) -> np.ndarray:
-        """y' (m, ...) of xi', without the quasi-static part: Psi eta' + Y w'."""
+        """Return y' (m, ...) of xi', without the quasi-static part: Psi eta' + Y w'."""
         eta_t, w_t = self.split(velocity)
         return np.asarray(self.modal.vectors @ eta_t + self.channels.carried @ w_t)
 
     def kinetic(self, velocity: np.ndarray) -> np.ndarray:
-        """Kinetic energy [J] of (r + q,) or of every column."""
+        """Return the kinetic energy [J] of xi' (r + q,), or of every column."""
         moving = self.motion(velocity) if self._carries else self.split(velocity)[0]
         return np.asarray(0.5 * np.add.reduce(moving * moving))
 
@@ -206,16 +208,19 @@ class LoadedLevel(Shown):
         return bool(np.any(self.channels.carried))
 
     def energy(self, displacement: np.ndarray, velocity: np.ndarray) -> float:
-        """Kinetic and strain energy [J] of xi, xi' (r + q,)."""
+        """Return the kinetic and strain energy [J] of xi, xi' (r + q,)."""
         return float(self.kinetic(velocity) + self.strain(displacement))
 
     def strain(self, displacement: np.ndarray) -> np.ndarray:
-        """Strain energy [J] as ``Base.strain`` has it, for (r + q,) or every column; given frequencies count."""
+        """Return the strain energy [J] of xi (r + q,) or of every column, as ``Base.strain``.
+
+        Frequencies that were given count in it.
+        """
         return self.strain_form(displacement)
 
     @property
     def strain_form(self) -> StrainForm:
-        """The same as a form in xi."""
+        """The strain energy as a form in xi."""
         if "strain" not in self.entries:
             self.entries["strain"] = self._strain_form()
         form: StrainForm = self.entries["strain"]
@@ -237,18 +242,18 @@ class LoadedLevel(Shown):
         return StrainForm(np.concatenate(weights), rows[:, :-1], rows[:, -1], linear[:-1], constant)
 
     def potential(self, displacement: np.ndarray) -> float:
-        """Strain energy less the potential f.x of the loads [J] at their present values."""
+        """Return the strain energy less the potential f.x of the loads [J] at their present values."""
         return self.potential_form(displacement)
 
     @functools.cached_property
     def potential_form(self) -> PotentialForm:
-        """The same as a form in xi."""
-        own, base, rest, patterns = self.level, self.level.base, self.asymptotic, self.excitation.patterns
-        y, r, q, static = rest.configuration, self.modal.modes, patterns.shape[1], self.excitation.static
+        """The potential energy as a form in xi."""
+        own, base, equilibrium, patterns = self.level, self.level.base, self.asymptotic, self.excitation.patterns
+        y, r, q, static = equilibrium.configuration, self.modal.modes, patterns.shape[1], self.excitation.static
         modal = -self.alone.asymptotic.drive
         if base.general:
-            modal += rest.load - self.modal.vectors.T @ static  # of what elements push
-        constant = rest.strain + self.stored - float(static @ y)
+            modal += equilibrium.load - self.modal.vectors.T @ static  # constant forces of elements
+        constant = equilibrium.strain + self.stored - float(static @ y)
         if not q:
             return PotentialForm(constant, modal, self.modal.squares, np.zeros((0, r)), self.follows)
         index = [i for i in own.indices if np.isfinite(base.stiffnesses[i])]
@@ -261,7 +266,7 @@ class LoadedLevel(Shown):
         return PotentialForm(constant, np.concatenate([modal, along]), self.modal.squares, form, self.follows)
 
     def rubbing(self, element: int) -> tuple[np.ndarray, np.ndarray, float]:
-        """T [N] of friction that goes with the force of a link: rows of xi and xi', and constant; zero without."""
+        """Return the friction force T [N] due to the force of a link: rows of xi and xi', and constant; else zeros."""
         own, rubs = self.level, self.level.base.contacts[element].states[self.states[element]].rubs
         if rubs is None:
             return np.zeros(own.modes), np.zeros(own.modes), 0.0
@@ -269,7 +274,7 @@ class LoadedLevel(Shown):
         return rubs[1] * own.force_rows[k], rubs[1] * own.force_rate_rows[k], rubs[1] * self.asymptotic.forces[k]
 
     def stretch(self, element: int) -> tuple[np.ndarray, float]:
-        """What an element's held link keeps of its stretch [m] while it does not hold: row.xi + constant."""
+        """Return the stretch [m] of an element's friction spring while it slips: row (r + q,) of xi, and constant."""
         base, (row, _, constant) = self.level.base, self.rubbing(element)
         held = next(k for k in base.link_indices[element] if base.links[k].held)
         stretch = base.contacts[element].states[self.states[element]].stretch
@@ -277,15 +282,15 @@ class LoadedLevel(Shown):
 
     @functools.cached_property
     def rubbing_elements(self) -> tuple[int, ...]:
-        """Those whose friction goes with the force of a link."""
+        """Elements whose friction force is proportional to the force of a link."""
         if not self.level.base.held:
             return ()
-        given = enumerate(zip(self.level.base.contacts, self.states, strict=True))
-        return tuple(i for i, (element, state) in given if element.states[state].rubs is not None)
+        elements = enumerate(zip(self.level.base.contacts, self.states, strict=True))
+        return tuple(i for i, (element, state) in elements if element.states[state].rubs is not None)
 
     @functools.cached_property
     def follows(self) -> np.ndarray:
-        """Rows (s, r + q + 1) of their springs' stretches, times the root of the stiffness."""
+        """Rows (s, r + q + 1) of the stretches of these elements' springs, times the root of the stiffness."""
         rows, base = list[np.ndarray](), self.level.base
         if not self.rubbing_elements:
             return np.zeros((0, self.level.modes + 1))
@@ -296,11 +301,11 @@ class LoadedLevel(Shown):
         return np.array(rows).reshape(-1, self.level.modes + 1)
 
     def configuration(self, displacement: np.ndarray) -> np.ndarray:
-        """y (m, ...) in base coordinates."""
+        """Return y (m, ...) in base coordinates."""
         return np.asarray((self.level.vectors @ displacement).T + self.asymptotic.configuration).T
 
 
 def _stored(base: ModalBase, states: Sequence[int]) -> float:
-    """Strain energy [J] of links that keep a stretch in these states without holding."""
-    given = ((element, element.states[state].stretch) for element, state in zip(base.contacts, states, strict=True))
-    return sum(0.5 * element.stiffness * stretch**2 for element, stretch in given if stretch)
+    """Return the strain energy [J] of links that keep a stretch in these states without holding."""
+    stretches = ((element, element.states[state].stretch) for element, state in zip(base.contacts, states, strict=True))
+    return sum(0.5 * element.stiffness * stretch**2 for element, stretch in stretches if stretch)

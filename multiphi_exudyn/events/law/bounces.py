@@ -1,4 +1,4 @@
-"""Bounces of rigid contacts: their speeds, who has rebounded, and the last bounce of a sequence (sentence 11)."""
+"""Bounces of rigid contacts: gap velocities, rebounds, and the last bounce of a sequence (sentence 11)."""
 
 from __future__ import annotations
 
@@ -43,21 +43,30 @@ from multiphi_exudyn.events.arrays import (
     WORKED,
 )
 from multiphi_exudyn.events.law.impact import RESTING, collide, fill_rows
-from multiphi_exudyn.events.law.impact_round_off import speed_size, unseen_speed
+from multiphi_exudyn.events.law.impact_round_off import negligible_speed, speed_size
 from multiphi_exudyn.events.states.signals import gap
 from multiphi_exudyn.events.states.state_arrays import copy_state, same_level
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.complementarity.free_rows import product
 from multiphi_exudyn.mathematics.round_off import ZERO
 
-__all__ = ["BRIEF", "has_rebounded", "keep_landing", "lands", "last_bounce", "only_bounces", "push_on", "row_speed"]
+__all__ = [
+    "BRIEF",
+    "apply_further_impact",
+    "has_rebounded",
+    "is_on_last_bounce",
+    "last_bounce",
+    "mark_last_bounces",
+    "only_bounces",
+    "row_speed",
+]
 
-BRIEF = 1e-12  # of the time so far: a shorter bounce is the last
+BRIEF = 1e-12  # relative to the time so far: a shorter bounce is the last
 
 
 @compiled
-def lands(ints: Ints, state: int, element: int) -> int:
-    """1 where an open contact comes down from its last bounce."""
+def is_on_last_bounce(ints: Ints, state: int, element: int) -> int:
+    """Return 1 if an open contact is on its last bounce."""
     level = ints[state + LEVEL]
     if ints[ints[level + STATES] + element] != OPEN:
         return 0
@@ -66,7 +75,7 @@ def lands(ints: Ints, state: int, element: int) -> int:
 
 @compiled
 def row_speed(ints: Ints, numbers: Numbers, state: int, k: int) -> float:
-    """Gap velocity of one of those that touch, zero where it is round-off; their rows have been filled."""
+    """Return the gap velocity of a touching contact, zero if it is round-off; ROWS must have been filled."""
     n = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS]
     row = ints[ROWS] + k * n
     speed = product(numbers, row, ints[state + SPEED], n)
@@ -74,8 +83,8 @@ def row_speed(ints: Ints, numbers: Numbers, state: int, k: int) -> float:
 
 
 @compiled
-def push_on(ints: Ints, numbers: Numbers, count: int) -> int:
-    """STRUCK becomes the state after one more impact, to the speeds WANTED; OK or FAILED."""
+def apply_further_impact(ints: Ints, numbers: Numbers, count: int) -> int:
+    """Replace STRUCK by the state after one more impact, with the gap velocities WANTED; return OK or FAILED."""
     touching, further = ints[TOUCHING], ints[FURTHER]
     if collide(ints, numbers, STRUCK, touching, count, 0, ints[WANTED], -1, STILL, further, LOST_IN_IMPACT) < 0:
         return FAILED
@@ -87,17 +96,17 @@ def push_on(ints: Ints, numbers: Numbers, count: int) -> int:
 
 @compiled
 def has_rebounded(ints: Ints, numbers: Numbers, k: int) -> int:
-    """1 where one of those that touch has been struck, and rebounds."""
+    """Return 1 if a touching contact has restitution and has been struck."""
     contact = ints[ints[TOUCHING] + k]
-    rebounds = numbers[ints[RESTITUTIONS] + contact] > 0.0 and lands(ints, WORKED, contact) == 0
+    rebounds = numbers[ints[RESTITUTIONS] + contact] > 0.0 and is_on_last_bounce(ints, WORKED, contact) == 0
     return 1 if rebounds and numbers[ints[IMPULSES] + k] > 0.0 else 0
 
 
 @compiled
 def last_bounce(ints: Ints, numbers: Numbers, count: int) -> int:
-    """11. How many leave their stops for the last time, after an impact: a bounce is too low to be seen, or too short.
+    """11. Begin the last bounce of contacts whose next bounce is too low or too short; return how many, or FAILED.
 
-    It becomes as long as all that would follow. xi'' of STRUCK stands in the accelerations. Or FAILED.
+    The last bounce takes as long as all bounces that would follow. ACCELERATION must hold xi'' of STRUCK.
     """
     level, last = ints[STRUCK + LEVEL], 0
     n = ints[level + MODES] + ints[CHANNELS]
@@ -105,20 +114,22 @@ def last_bounce(ints: Ints, numbers: Numbers, count: int) -> int:
     for k in range(count):
         contact, row, wanted = ints[ints[TOUCHING] + k], ints[ROWS] + k * n, ints[WANTED] + k
         restitution, speed = numbers[ints[RESTITUTIONS] + contact], row_speed(ints, numbers, STRUCK, k)
-        ends = has_rebounded(ints, numbers, k) == 1 and restitution < 1.0 and ints[ints[LASTS] + contact] == 0
+        may_end = has_rebounded(ints, numbers, k) == 1 and restitution < 1.0 and ints[ints[LASTS] + contact] == 0
         numbers[wanted] = 0.0
         falling = -product(numbers, row, ints[ACCELERATION], n)
-        unseen = max(unseen_speed(ints, numbers, STRUCK, contact, row), 0.5 * BRIEF * numbers[INSTANT_TIME] * falling)
-        if ends and 0.0 < speed <= unseen:
+        negligible = max(
+            negligible_speed(ints, numbers, STRUCK, contact, row), 0.5 * BRIEF * numbers[INSTANT_TIME] * falling
+        )
+        if may_end and 0.0 < speed <= negligible:
             numbers[wanted] = speed / (1.0 - restitution)
             ints[ints[LASTS] + contact] = 1
             last += 1
-    return last if last == 0 or push_on(ints, numbers, count) == OK else FAILED
+    return last if last == 0 or apply_further_impact(ints, numbers, count) == OK else FAILED
 
 
 @compiled
 def only_bounces(ints: Ints, numbers: Numbers) -> int:
-    """1 where at an instant contacts of restitution below 1 have rebounded, and nothing else has changed."""
+    """Return 1 if an instant has changed nothing but rebounds of contacts with restitution below 1."""
     for k in range(ints[CHANGE_COUNT]):
         restitution = numbers[ints[RESTITUTIONS] + ints[ints[CHANGES] + k * CHANGE_WIDTH]]
         if not 0.0 < restitution < 1.0:
@@ -127,10 +138,11 @@ def only_bounces(ints: Ints, numbers: Numbers) -> int:
 
 
 @compiled
-def keep_landing(ints: Ints, numbers: Numbers) -> None:
-    """11. Phases of WORKED: contacts on their last bounce, since this instant or before it without a blow since.
+def mark_last_bounces(ints: Ints, numbers: Numbers) -> None:
+    """11. Set phases of WORKED for contacts on their last bounce, begun now, or before without an impact since.
 
-    Who has been struck was at its stop: a gap that is the round-off of the instant, at its speed, is armed.
+    A contact that has been struck was at its stop: its exit is armed if its gap is within the round-off of the instant
+    at its speed.
     """
     level, armed = ints[WORKED + LEVEL], 1
     n = ints[level + MODES] + ints[CHANNELS]
@@ -142,10 +154,10 @@ def keep_landing(ints: Ints, numbers: Numbers) -> None:
                     struck = 1
             phase = ints[WORKED + PHASES] + ints[ints[level + FIRST_EXITS] + i]
             speed = product(numbers, ints[level + SPEEDS] + i * (n + 1), ints[WORKED + SPEED], n)
-            blurred = ZERO * numbers[INSTANT_TIME] * speed
-            if struck == 1 and ints[phase] == RECOVERING and -gap(ints, numbers, WORKED, i) <= blurred:
+            round_off = ZERO * numbers[INSTANT_TIME] * speed
+            if struck == 1 and ints[phase] == RECOVERING and -gap(ints, numbers, WORKED, i) <= round_off:
                 ints[phase] = ARMED
-            last = ints[ints[LASTS] + i] == 1 or (struck == 0 and lands(ints, REACHED, i) == 1)
+            last = ints[ints[LASTS] + i] == 1 or (struck == 0 and is_on_last_bounce(ints, REACHED, i) == 1)
             if last and ints[phase] == ARMED:
                 ints[phase] = LANDING
     for k in range(ints[level + EXIT_COUNT]):

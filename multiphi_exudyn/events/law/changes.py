@@ -1,6 +1,6 @@
-"""Changes of an instant: who asks, which levels are entered, what is lost on the way.
+"""Changes at an instant: requests of elements, the levels entered, and the energy lost by that.
 
-Sets of elements are flags (c,) in the ints; who asks, the state that each asks for, or NOBODY.
+Sets of elements are flags (c,) in the ints. Requests (c,) hold the state that each element requests, or NO_REQUEST.
 """
 
 from __future__ import annotations
@@ -51,81 +51,81 @@ from multiphi_exudyn.events.states.state_arrays import copy_state
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 
 __all__ = [
-    "NOBODY",
-    "bears_nothing",
+    "NO_REQUEST",
+    "bears_no_impulse",
     "clear",
     "enter",
-    "flag_asking",
-    "is_held",
-    "note",
+    "flag_requests",
+    "is_closed_rigid",
+    "record_change",
     "segment_at",
+    "set_requested_states",
+    "state_without_stick",
     "transfer",
-    "turn_wishes",
-    "without_stick",
 ]
 
-NOBODY = -1  # in place of the state that an element asks for
+NO_REQUEST = -1  # in place of a requested state
 
 
 @compiled
-def flag_asking(ints: Ints, asking: int, flags: int) -> None:
-    """Flags (c,) of those that ask."""
+def flag_requests(ints: Ints, requests: int, flags: int) -> None:
+    """Set flags (c,) of the elements that have a request."""
     for i in range(ints[ELEMENTS]):
-        ints[flags + i] = 1 if ints[asking + i] != NOBODY else 0
+        ints[flags + i] = 1 if ints[requests + i] != NO_REQUEST else 0
 
 
 @compiled
-def turn_wishes(ints: Ints, numbers: Numbers, asking: int) -> None:
-    """8, 10. Where the state that an element of WORKED asks for hangs on a speed or a place, the one that it says."""
+def set_requested_states(ints: Ints, numbers: Numbers, requests: int) -> None:
+    """8, 10. Replace requested states of WORKED that depend on a slip velocity or on a force law's displacement."""
     level = ints[WORKED + LEVEL]
     for k in range(ints[level + EXIT_COUNT]):
         exit_ = ints[level + EXITS] + k * EXIT_INTS
         element = ints[exit_ + ELEMENT]
-        if ints[exit_ + TURN] >= 0 and ints[asking + element] == ints[exit_ + ASKED]:
+        if ints[exit_ + TURN] >= 0 and ints[requests + element] == ints[exit_ + ASKED]:
             along = ints[exit_ + TURN + ROW] + ints[level + MODES] + ints[CHANNELS]
             sign = row_sign(ints, numbers, WORKED, exit_ + TURN, speed_size(ints, numbers, WORKED, along))
             if sign != 0:
-                ints[asking + element] = ints[exit_ + (FORWARD if sign > 0 else BACKWARD)]
+                ints[requests + element] = ints[exit_ + (FORWARD if sign > 0 else BACKWARD)]
     for i in range(ints[ELEMENTS]):
-        if ints[asking + i] != NOBODY and ints[ints[SEGMENTS] + 3 * i] > 0:
+        if ints[requests + i] != NO_REQUEST and ints[ints[SEGMENTS] + 3 * i] > 0:
             segment = segment_at(ints, numbers, WORKED, i)
             if segment != ints[ints[level + STATES] + i]:
-                ints[asking + i] = segment
+                ints[requests + i] = segment
 
 
 @compiled
 def segment_at(ints: Ints, numbers: Numbers, state: int, element: int) -> int:
-    """8. The segment of a force law in which its place lies."""
-    given, passed = ints[SEGMENTS] + 3 * element, 0
-    first, above, below = ints[given], ints[given + 1], ints[given + 2]
-    while passed < above and gap(ints, numbers, state, first + passed) < 0.0:
-        passed += 1
-    if passed > 0:
-        return passed
-    while passed < below and gap(ints, numbers, state, first + above + passed) < 0.0:
-        passed += 1
-    return above + passed if passed > 0 else 0
+    """8. Return the segment of a force law in which its displacement lies."""
+    record, knots_passed = ints[SEGMENTS] + 3 * element, 0
+    first, above, below = ints[record], ints[record + 1], ints[record + 2]
+    while knots_passed < above and gap(ints, numbers, state, first + knots_passed) < 0.0:
+        knots_passed += 1
+    if knots_passed > 0:
+        return knots_passed
+    while knots_passed < below and gap(ints, numbers, state, first + above + knots_passed) < 0.0:
+        knots_passed += 1
+    return above + knots_passed if knots_passed > 0 else 0
 
 
 @compiled
-def is_held(ints: Ints, state: int, element: int) -> int:
-    """1 where a rigid contact is closed."""
+def is_closed_rigid(ints: Ints, state: int, element: int) -> int:
+    """Return 1 if an element is a closed rigid contact."""
     closed = ints[ints[ints[state + LEVEL] + STATES] + element] != OPEN
     return 1 if closed and ints[ints[KINDS] + element] == RIGID else 0
 
 
 @compiled
-def bears_nothing(ints: Ints, numbers: Numbers, element: int) -> int:
-    """12. 1 where friction without a spring bears no impulse: its pressure is no reaction."""
+def bears_no_impulse(ints: Ints, numbers: Numbers, element: int) -> int:
+    """12. Return 1 for friction without a spring whose normal force is no reaction: it transmits no impulse."""
     rigid = ints[ints[STICKS] + element] >= 0 and numbers[ints[SPRINGS] + element] == 0.0
     return 1 if rigid and ints[ints[KINDS] + element] != RIGID else 0
 
 
 @compiled
-def without_stick(ints: Ints, element: int, before: int) -> int:
-    """12. The state of friction that does not stick where it could: idle at a contact that gives way, else in slip.
+def state_without_stick(ints: Ints, element: int, before: int) -> int:
+    """12. Return the state of a friction element that does not stick: idle at a contact that is not rigid, else slip.
 
-    There the slip that it is in ``before``, or forward.
+    The direction of slip is that of the state ``before``, or forward if that is no slip.
     """
     sticks = ints[ints[STICKS] + element]
     gives_way = ints[ints[KINDS] + element] in (COMPLIANT, VISCOUS)
@@ -133,8 +133,8 @@ def without_stick(ints: Ints, element: int, before: int) -> int:
 
 
 @compiled
-def note(ints: Ints, numbers: Numbers, element: int, entered: int, impulse: float) -> None:
-    """List a change: the state entered, or SHARED; shared impulses stand before the change that they belong to."""
+def record_change(ints: Ints, numbers: Numbers, element: int, entered: int, impulse: float) -> None:
+    """List a change: the state entered, or SHARED; shared impulses precede the change that they belong to."""
     k = ints[CHANGE_COUNT]
     ints[ints[CHANGES] + k * CHANGE_WIDTH] = element
     ints[ints[CHANGES] + k * CHANGE_WIDTH + 1] = entered
@@ -145,7 +145,7 @@ def note(ints: Ints, numbers: Numbers, element: int, entered: int, impulse: floa
 
 @compiled
 def enter(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
-    """A state becomes WORKED, with its phases, and what was lost on the way is added up."""
+    """Copy a state to WORKED, update its phases, and add the energies in LOST_NOW to LOST."""
     copy_state(ints, numbers, state, WORKED)
     update_phases(ints, numbers, waves, WORKED, -1)
     ints[TRANSITIONS_NOW] += 1
@@ -157,7 +157,7 @@ def enter(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
 
 @compiled
 def transfer(ints: Ints, numbers: Numbers, state: int, key: int, result: int) -> int:
-    """A state in the level with a key (eq. 38.6), and what truncation took in LOST_NOW; OK or NEED."""
+    """Map a state into the level with a key (eq. 38.6), losses to truncation in LOST_NOW; return OK or NEED."""
     level = find_level(ints, key)
     if level < 0:
         return level
@@ -174,6 +174,6 @@ def transfer(ints: Ints, numbers: Numbers, state: int, key: int, result: int) ->
 
 @compiled
 def clear(numbers: Numbers, losses: int) -> None:
-    """Nothing is lost."""
+    """Set losses (6,) to zero."""
     for k in range(LOSSES):
         numbers[losses + k] = 0.0

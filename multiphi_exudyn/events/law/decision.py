@@ -1,83 +1,93 @@
 """Law of events: when an element changes its state, and which level follows. It is the same for every run and body.
 
-Every contact has a function that says whether its present state is admissible, s >= 0:
+Every contact has a signal s that says whether its present state is admissible, s >= 0:
 
     open                 s = g         gap
     closed, compliant    s = -g        penetration
     closed, rigid        s = lambda    reaction
     closed, viscous      s = lambda    force of spring and damper
 
-With all modes the states exclude each other: where one stops being admissible the other begins to be. The truncated
-bases of two levels need not agree, so the law says what happens then; each sentence with the functions that say it:
+With all modes the states exclude each other: at the instant at which one stops being admissible another one begins to
+be. The truncated bases of two levels need not agree, so the law says what happens then. Each sentence is followed by
+the functions that implement it:
 
-1. A contact is *armed* while s >= 0. When s falls through zero it asks to change state.
+1. A contact is *armed* while s >= 0. When s falls through zero it requests a change of state.
    -> phases.phase_of, monitoring.watch, monitoring.who_asks, decision.decide_jump
-2. A rigid contact that asks to close is decided together with all rigid contacts that touch, in the basis of the
-   level in which they are open: Moreau's impact, then complementarity of acceleration and reaction. A contact closes
-   only if the level it enters gives it a reaction >= 0. At rest is also what would be back at its stop before its gap
-   is more than round-off: so ends a sequence of ever smaller bounces. A contact whose gap the closed ones hold
-   already stays open at its stop, without a force: of redundant contacts a set that is independent carries all.
-   -> striking.impact, impact.collide, resting.list_resting, resting.press, resting.stay_closed, redundancy.join,
-   striking.close_without_impact
-3. A rigid contact that asks to open always opens: it never pulls. Friction that asks changes always, but stays in slip
-   where it has come from stick at the same instant and truncation has left it a speed against its slip. With a spring
-   that has fallen from its static limit it sticks again: its pressure may fall faster than its force.
-   -> switching.is_firm, switching.open_and_enter, phases.is_pulled, sticking.let_go
-4. A compliant contact that asks changes state unless s in the level it would enter is negative and falling. Of
-   several that ask together and may not, the first that may alone changes.
-   -> switching.try_wishes, switching.switch, phases.is_denied
-5. A contact whose s is negative after a change (truncation) is *recovering*: it keeps its state while s rises, becomes
-   armed when s reaches zero, and asks again if s turns down before.
+2. A rigid contact that requests to close is decided together with all rigid contacts that touch, in the basis of the
+   level in which all of them are open: first Moreau's impact, then complementarity of acceleration and reaction. A
+   contact closes only if its reaction in the level entered is >= 0. A contact counts as at rest at its stop also if its
+   free motion brings it back before its gap is more than round-off: this ends a sequence of ever smaller bounces. A
+   contact whose gap the closed contacts already fix stays open at its stop, without a force: of redundant contacts an
+   independent set carries all forces.
+   -> striking.impact, impact.collide, resting.list_resting, resting.find_pressed, resting.drop_pulled,
+   redundancy.keep_independent, striking.close_without_impact
+3. A rigid contact that requests to open always opens: it never pulls. Friction that requests a change always changes,
+   except for friction that has gone from stick to slip at the same instant: it keeps slipping if truncation has left it
+   a velocity against its slip. If its spring has dropped from its static limit it sticks again, as its normal force may
+   fall faster than its spring force.
+   -> switching.is_unconditional, switching.open_and_enter, phases.is_pulled, sticking.open_pulled
+4. A compliant contact that requests a change makes it, unless s in the level it would enter is negative and falling. If
+   several contacts request changes together and are refused, the first one that is admitted alone changes.
+   -> switching.try_targets, switching.switch, phases.is_denied
+5. A contact whose s is negative after a change, by truncation, is *recovering*: it keeps its state while s rises, is
+   armed when s reaches zero, and requests a change again if s begins to fall before.
    -> phases.phase_of, monitoring.watch
-6. A contact that asked and may not change is *refused*: it keeps its state until s has risen to zero (then it is
-   armed), or until s in the level it would enter has (then it changes). Where it then asks again at the same
-   instant, for ever, it is *held back* until s has risen to zero, or until another contact asks.
+6. A contact that may not make the change it requests is *refused*: it keeps its state until s has risen to zero (then
+   it is armed), or until s in the level it would enter has risen to zero (then it changes). If it would then repeat its
+   request at the same instant without end, it is *held back* until s has risen to zero, or until another contact
+   requests a change.
    -> phases.update_phases, monitoring.watch, monitoring.flag_again, phases.hold_back
-7. A viscous contact never pulls. It opens when its force falls to zero, mostly before its gap has risen to zero; then,
-   open with g < 0, it is refused as in 6: armed when g has risen to zero, closed when its force in the level with it
-   closed has. It may stay closed only with a force >= 0, and may open where its force would be negative.
+7. A viscous contact never pulls. It opens when its force falls to zero, mostly before its gap has risen to zero. It is
+   then open with g < 0 and refused as in 6: it is armed when g has risen to zero, and closes when its force in the
+   level with it closed has risen to zero. It may stay closed only with a force >= 0, and may open if its force would be
+   negative.
    -> switching.is_relaxing
-8. A force law asks at either end of its segment for the next one, and changes always. Where truncation has left it
-   further beyond, for that in which it lies; it goes on from there, at the same instant, until it lies where it is, but
-   not back to where it has just come from.
-   -> changes.segment_at, changes.turn_wishes, switching.is_firm, decision.is_latest
-9. A sign is that of the first derivative that is not round-off.
+8. A force law requests the next segment at either end of its present one, and always changes. If truncation has moved
+   its displacement further, it requests the segment in which its displacement lies. It goes on at the same instant
+   until its segment contains its displacement, but does not return to the segment that it has just left.
+   -> changes.segment_at, changes.set_requested_states, switching.is_unconditional, decision.is_return
+9. The sign of a signal is that of its first derivative, of order zero or higher, that is not round-off.
    -> signals.row_sign, signals.rate_sign, phases.becomes
-10. A contact with friction that closes sticks where it hits; without a spring it slides in the direction in which it
-   moves, and sticks where it does not. Whether it goes on sticking, or sliding, does not keep it from closing: what
-   is always taken is decided after it, at the same instant. With a spring it sticks while its force, beyond the limit
-   by truncation, comes back to it. Where its pressure falls to zero it opens, and keeps no friction.
-   A rigid one that strikes has a tangential impulse of at most mu times the normal one, of all that touch at once,
-   speed or none. What then slides pushes with its friction, what rests sticks up to its static friction. Who is at its
-   stop begins in stick, and of redundant ones an independent set sticks.
-   -> changes.turn_wishes, phases.is_denied, impact.rub, resting.sliding_level, rebounds.hear_touching
-11. A rigid contact with restitution e that strikes leaves its stop with -e times its speed, and so do all that touch
-   and are struck with it, in one impact (Moreau); those that are coupled have one e. Who is driven back to its stop is
-   struck again at once. Where one of them rubs e is that of impulses: an impact without restitution, then one of at
-   least e times its impulses (Poisson). A bounce too low to be seen is the last: it takes as long as all that would
-   follow, and where it lands e is zero.
-   -> rebounds.hear_touching, rebounds.rebound, rebounds.collide_and_rebound, rebounds.bounce, bounces.last_bounce,
-   bounces.keep_landing
-12. Rigid friction elements that stick, turn or begin to slip at an instant are decided together, those at contacts that
-   give way with their mu N of the instant: their forces within their limits, static ones until they slip, are
-   complementary to their accelerations. Of those that then fall from their static limits the ones that turn fall first:
-   others may bear less after it, and stick on. What that leaves to the next derivative, and to truncation, each decides
-   alone. Of redundant ones an independent set sticks, at last who bears the most beyond its limit; the others push with
-   their limit, as if they slipped, or are idle at a contact that gives way, and take over when they are needed, also
-   from one that only round-off keeps within its limit: the motion is the same where not more than one has a static
-   limit. So do those along a closed rigid contact. One that would be pulled beside what sticks opens, and all is
-   decided once more without it; also one beside which some fall that would pull it if they stuck, where without it all
-   hold. None bears an impulse, nor does the friction of a contact that gives way.
-   -> sticking.stick_together, sticking.decide_at_rest, friction_problem.sort_by_reserve, sticking.choose,
-   sticking.thin_out_idle, sticking.let_go, sticking.hold_without, redundancy.thin_out, redundancy.follows,
-   striking.slide_on, changes.bears_nothing, changes.without_stick
+10. A contact with friction and a tangential spring sticks when it closes. Without a spring it slides in the direction
+   of its slip velocity, or sticks if that is zero. A stick or slip that cannot last does not prevent closing: exits
+   that are always taken follow at the same instant. A spring that truncation has left beyond the limit sticks while its
+   force returns to the limit. When its normal force falls to zero the contact opens, and its friction ends.
+   A rigid contact that strikes has a tangential impulse of at most mu times its normal impulse, together with all that
+   touch, with or without a slip velocity. After the impact a sliding contact exerts its friction force, and one at rest
+   sticks up to its static limit. A contact that starts at its stop starts in stick, and of redundant ones an
+   independent set sticks.
+   -> changes.set_requested_states, phases.is_denied, impact.add_friction_rows, resting.sliding_level,
+   rebounds.flag_touching
+11. A rigid contact with restitution e that strikes leaves its stop with -e times its velocity. So do all contacts that
+   touch and are struck with it, in one impact (Moreau); coupled ones must have one e. A contact that others drive back
+   to its stop is struck again at the same instant. If any of them has friction, e is that of impulses: an impact
+   without restitution, then one with at least e times its impulses (Poisson). A bounce that is too low or too short to
+   be resolved is the last: it takes as long as all bounces that would follow, and at its end e is zero.
+   -> rebounds.flag_touching, rebounds.set_rebound_speeds, rebounds.collide_and_rebound, rebounds.repeat_impacts,
+   bounces.last_bounce, bounces.mark_last_bounces
+12. Rigid friction elements that stick, reverse or begin to slip at an instant are decided together, those at contacts
+   that are not rigid with their present mu N. Their forces are within their limits, static ones until they slip, and
+   complementary to their accelerations. Of the elements that then fall from their static limits those that reverse
+   their slip fall first: others may bear less after it, and go on sticking. What depends on the next derivative, or on
+   truncation, each element decides alone.
+   Of redundant elements an independent set sticks; the one that bears most beyond its limit falls last. The others
+   exert their limit as if they slipped, or are idle at a contact that is not rigid. They take over when needed,
+   also from an element that only round-off keeps within its limit. The motion is the same if not more than one of them
+   has a static limit. This holds for redundant friction along a closed rigid contact too.
+   A rigid contact that would pull beside the sticking elements opens, and all is decided again without it. So does one
+   beside which elements fall, if it would pull with them sticking, and all of them stick without it. None of these
+   elements bears an impulse, nor does the friction of a contact that is not rigid.
+   -> sticking.stick_together, sticking.decide_at_rest, friction_problem.sort_by_reserve, sticking.choose_states,
+   sticking.stick_independent_set, sticking.open_pulled, sticking.retry_without_pulled, redundancy.drop_redundant_stick,
+   redundancy.is_redundant_stick, striking.slip_after_impact, changes.bears_no_impulse, changes.state_without_stick
 
-An instant is decided here: ``decide`` settles it, ``settle`` lets all be heard until nobody is refused who was not,
-``answer`` gives those who ask to striking or to switching. All instants are roots of analytic signals, so nothing
-depends on sampling. Negative gaps that truncation leaves are reported; an endless exchange is a failure, with a cause.
+An instant is decided here. ``decide`` computes the state after it, ``settle`` repeats decisions until no refused
+element is untreated, and ``apply_requests`` passes requests to striking, sticking or switching. All instants are roots
+of analytic signals, so nothing depends on sampling. Negative gaps that truncation leaves are reported. An exchange of
+states without end is a failure, with a cause.
 
-The decision works on the state WORKED, which begins as the one REACHED, and leaves that one as it was: where something
-is missing (NEED) it is made again from the start.
+The decision works on the state WORKED, which begins as a copy of REACHED and leaves REACHED as it was: if something is
+missing (NEED) the decision is repeated from the start.
 """
 
 from __future__ import annotations
@@ -137,10 +147,18 @@ from multiphi_exudyn.events.arrays import (
     TRANSITIONS_NOW,
     WORKED,
 )
-from multiphi_exudyn.events.law.bounces import keep_landing
-from multiphi_exudyn.events.law.changes import NOBODY, bears_nothing, clear, enter, flag_asking, is_held, turn_wishes
+from multiphi_exudyn.events.law.bounces import mark_last_bounces
+from multiphi_exudyn.events.law.changes import (
+    NO_REQUEST,
+    bears_no_impulse,
+    clear,
+    enter,
+    flag_requests,
+    is_closed_rigid,
+    set_requested_states,
+)
 from multiphi_exudyn.events.law.phases import hold_back, is_pulled, keep_entered, update_phases
-from multiphi_exudyn.events.law.rebounds import forget_bounces, hear_touching
+from multiphi_exudyn.events.law.rebounds import clear_last_bounces, flag_touching
 from multiphi_exudyn.events.law.sticking import stick_together
 from multiphi_exudyn.events.law.striking import close_without_impact, impact
 from multiphi_exudyn.events.law.switching import switch
@@ -151,16 +169,17 @@ from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, TAKEN_FALLING, TAKEN
 
 __all__ = ["ROUNDS", "decide", "decide_jump"]
 
-MOST_RETURNS = 3  # changes of an element from or to a state at an instant, from which on it stays there
-ROUNDS = 20  # of decisions at one instant: above it the contacts exclude each other's states for ever
+MOST_RETURNS = 3  # changes of an element from or to a state at an instant; after more it keeps its state
+ROUNDS = 20  # decisions at one instant: with more the contacts exclude each other's states without end
 
 
 @compiled
 def decide(ints: Ints, numbers: Numbers, waves: Waves) -> int:
-    """WORKED becomes the state right after an instant at which the elements in ASKING ask; OK, NEED or FAILED.
+    """Set WORKED to the state right after an instant at which elements request changes; return OK, NEED or FAILED.
 
-    AGAIN: those refused at it before. Energies lost are added up in LOST, changes listed. Where in the end all elements
-    are as before, none was struck, no spring of friction has let go and none would pull, nothing has happened at it.
+    ASKING holds the requests; AGAIN flags the elements that were refused at this instant before. The energies lost are
+    summed in LOST, and the changes are listed. If in the end every element is in its old state, no contact was struck,
+    no friction spring has dropped from its static limit and no rigid contact would pull, the instant changes nothing.
     """
     clear(numbers, LOST)
     first, struck = ints[FIRST_CHANGE], 0
@@ -169,7 +188,7 @@ def decide(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     ints[MAPPED_AGAIN] = 0
     ints[SPEEDS_CHANGED] = 0
     copy_state(ints, numbers, REACHED, WORKED)
-    forget_bounces(ints)
+    clear_last_bounces(ints)
     ints[TOGETHER] = 0
     clear_turning_speeds(ints, numbers, WORKED)
     status = settle(ints, numbers, waves)
@@ -179,33 +198,33 @@ def decide(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         shared = ints[ints[CHANGES] + k * CHANGE_WIDTH + 1] == SHARED
         if shared or numbers[ints[CHANGE_IMPULSES] + k] != 0.0:
             struck = 1
-    moved = struck == 1 or numbers[LOST + FRICTION] != 0.0 or same_level(ints, REACHED, WORKED) == 0
-    if ints[CHANGE_COUNT] > first and not moved and is_pulled(ints, numbers, waves, REACHED) == 0:
+    changed = struck == 1 or numbers[LOST + FRICTION] != 0.0 or same_level(ints, REACHED, WORKED) == 0
+    if ints[CHANGE_COUNT] > first and not changed and is_pulled(ints, numbers, waves, REACHED) == 0:
         copy_state(ints, numbers, REACHED, WORKED)
-        flag_asking(ints, ints[ASKING], ints[DENIED])
+        flag_requests(ints, ints[ASKING], ints[DENIED])
         update_phases(ints, numbers, waves, WORKED, ints[DENIED])
         hold_back(ints, WORKED)
         clear(numbers, LOST)
         ints[CHANGE_COUNT] = first
-    keep_landing(ints, numbers)
+    mark_last_bounces(ints, numbers)
     return OK
 
 
 @compiled
 def decide_jump(ints: Ints, numbers: Numbers, waves: Waves) -> int:
-    """1. The decision after channels have jumped: OK where nobody asks, EVENT where somebody does; NEED or FAILED."""
-    exits, asking = ints[ints[REACHED + LEVEL] + EXITS], 0
+    """1. Decide after channels have jumped: OK without any request, EVENT with at least one, else NEED or FAILED."""
+    exits, request_count = ints[ints[REACHED + LEVEL] + EXITS], 0
     for i in range(ints[ELEMENTS]):
-        ints[ints[ASKING] + i] = NOBODY
+        ints[ints[ASKING] + i] = NO_REQUEST
         ints[ints[AGAIN] + i] = 0
     for k in range(ints[ints[REACHED + LEVEL] + EXIT_COUNT]):
         exit_ = exits + k * EXIT_INTS
-        waits = ints[ints[REACHED + PHASES] + k] in (ARMED, LANDING)
-        if waits and row_sign(ints, numbers, REACHED, exit_ + SIGNAL, 0.0) < 0:
+        is_armed = ints[ints[REACHED + PHASES] + k] in (ARMED, LANDING)
+        if is_armed and row_sign(ints, numbers, REACHED, exit_ + SIGNAL, 0.0) < 0:
             ints[ints[ASKING] + ints[exit_ + ELEMENT]] = ints[exit_ + ASKED]
-            asking = 1
+            request_count = 1
     ints[CHANGE_COUNT] = 0
-    if asking == 0:
+    if request_count == 0:
         return OK
     status = decide(ints, numbers, waves)
     return status if status < 0 else EVENT
@@ -213,35 +232,35 @@ def decide_jump(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 
 @compiled
 def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
-    """Decisions at one instant until nobody is refused who has not been heard; OK, NEED or FAILED."""
-    c, asking, heard, freed, pending = ints[ELEMENTS], ints[ASKING], ints[HEARD], ints[FREED], ints[PENDING]
-    flag_asking(ints, asking, heard)
-    asked = 0
+    """Repeat decisions at one instant until no refused element is untreated; return OK, NEED or FAILED."""
+    c, requests, treated, freed, pending = ints[ELEMENTS], ints[ASKING], ints[HEARD], ints[FREED], ints[PENDING]
+    flag_requests(ints, requests, treated)
+    request_count = 0
     for i in range(c):
-        ints[freed + i] = is_held(ints, WORKED, i) if ints[asking + i] == OPEN else 0
-        asked += ints[heard + i]
-    if asked > 0:
-        status = answer(ints, numbers, waves, asking)
+        ints[freed + i] = is_closed_rigid(ints, WORKED, i) if ints[requests + i] == OPEN else 0
+        request_count += ints[treated + i]
+    if request_count > 0:
+        status = apply_requests(ints, numbers, waves, requests)
         if status < 0:
             return status
     else:
         update_phases(ints, numbers, waves, WORKED, -1)
     for _ in range(ROUNDS + c + ints[KNOTS]):
         keep_entered(ints, numbers)
-        left = find_refused(ints)
-        if left == 0:
+        refusals = classify_refusals(ints)
+        if refusals == 0:
             return OK
         if ints[CHANGE_COUNT] + 3 * c > ints[CHANGE_ROOM]:
             break
         status = OK
-        if left == 1:
+        if refusals == 1:
             for i in range(c):
-                if ints[pending + i] != NOBODY:
-                    ints[heard + i] = 1
-                    if ints[pending + i] == OPEN and is_held(ints, WORKED, i) == 1:
+                if ints[pending + i] != NO_REQUEST:
+                    ints[treated + i] = 1
+                    if ints[pending + i] == OPEN and is_closed_rigid(ints, WORKED, i) == 1:
                         ints[freed + i] = 1
-            status = answer(ints, numbers, waves, pending)
-        elif left == 2:  # heard before: what others did at this instant took its reaction away
+            status = apply_requests(ints, numbers, waves, pending)
+        elif refusals == 2:  # treated before: changes of others at this instant have removed its reaction
             status = switch(ints, numbers, waves, ints[PULLING])
         else:
             hold_back(ints, WORKED)
@@ -249,47 +268,48 @@ def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         if status < 0:
             return status
     ints[CAUSE] = NOT_ADMISSIBLE
-    flag_asking(ints, pending, ints[CAUSED_BY])
+    flag_requests(ints, pending, ints[CAUSED_BY])
     return FAILED
 
 
 @compiled
-def find_refused(ints: Ints) -> int:
-    """0: no exit of WORKED is refused; 1: those of elements not heard yet, PENDING; 2: some always taken, PULLING.
+def classify_refusals(ints: Ints) -> int:
+    """Return what kind of refused exits WORKED has, as a number from 0 to 3.
 
-    3: of others only. Who has changed has been heard. What is taken once is taken where another has changed since, and
-    does not wait where the instant itself, an impact, has turned it.
+    0: none. 1: exits of elements not treated yet at this instant, requests in PENDING. 2: exits that are always taken,
+    requests in PULLING. 3: others only. An element that has changed counts as treated. An exit that is taken once is
+    taken if another element has changed since; it does not wait if an impact at this instant has reversed it.
     """
-    level, heard, pending, pulling = ints[WORKED + LEVEL], ints[HEARD], ints[PENDING], ints[PULLING]
+    level, treated, pending, always_taken = ints[WORKED + LEVEL], ints[HEARD], ints[PENDING], ints[PULLING]
     for k in range(ints[FIRST_CHANGE], ints[CHANGE_COUNT]):
         if ints[ints[CHANGES] + k * CHANGE_WIDTH + 1] != SHARED:
-            ints[heard + ints[ints[CHANGES] + k * CHANGE_WIDTH]] = 1
+            ints[treated + ints[ints[CHANGES] + k * CHANGE_WIDTH]] = 1
     for i in range(ints[ELEMENTS]):
-        ints[pending + i] = NOBODY
-        ints[pulling + i] = NOBODY
-    refused, unheard, pulled = 0, 0, 0
+        ints[pending + i] = NO_REQUEST
+        ints[always_taken + i] = NO_REQUEST
+    refused, untreated, taken_count = 0, 0, 0
     for k in range(ints[level + EXIT_COUNT]):
         exit_ = ints[level + EXITS] + k * EXIT_INTS
         element = ints[exit_ + ELEMENT]
-        if ints[ints[WORKED + PHASES] + k] == REFUSED or is_turned(ints, k) == 1:
+        if ints[ints[WORKED + PHASES] + k] == REFUSED or is_reversed_by_impact(ints, k) == 1:
             refused = 1
-            if ints[heard + element] == 0:
+            if ints[treated + element] == 0:
                 ints[pending + element] = ints[exit_ + ASKED]
-                unheard = 1
-            once = ints[exit_ + FIRMNESS] == TAKEN_ONCE and is_latest(ints, element, ints[exit_ + ASKED]) == 0
+                untreated = 1
+            once = ints[exit_ + FIRMNESS] == TAKEN_ONCE and is_return(ints, element, ints[exit_ + ASKED]) == 0
             if ints[exit_ + FIRMNESS] == ALWAYS_TAKEN or ints[exit_ + FIRMNESS] == TAKEN_FALLING or once:
-                ints[pulling + element] = ints[exit_ + ASKED]
-                pulled = 1
+                ints[always_taken + element] = ints[exit_ + ASKED]
+                taken_count = 1
     if refused == 0:
         return 0
-    if unheard == 1:
+    if untreated == 1:
         return 1
-    return 2 if pulled == 1 else 3
+    return 2 if taken_count == 1 else 3
 
 
 @compiled
-def is_turned(ints: Ints, exit_number: int) -> int:
-    """1 where what is taken once waits in WORKED, and was armed in the same state of its element before the instant."""
+def is_reversed_by_impact(ints: Ints, exit_number: int) -> int:
+    """Return 1 if an exit taken once is recovering in WORKED, but was armed before the instant in the same state."""
     level, before = ints[WORKED + LEVEL], ints[REACHED + LEVEL]
     exit_ = ints[level + EXITS] + exit_number * EXIT_INTS
     element = ints[exit_ + ELEMENT]
@@ -297,55 +317,58 @@ def is_turned(ints: Ints, exit_number: int) -> int:
     if not waits or ints[ints[before + STATES] + element] != ints[ints[level + STATES] + element]:
         return 0
     k = ints[ints[before + FIRST_EXITS] + element] + exit_number - ints[ints[level + FIRST_EXITS] + element]
-    return 1 if ints[ints[REACHED + PHASES] + k] == ARMED and is_latest(ints, element, ints[exit_ + ASKED]) == 0 else 0
+    return 1 if ints[ints[REACHED + PHASES] + k] == ARMED and is_return(ints, element, ints[exit_ + ASKED]) == 0 else 0
 
 
 @compiled
-def is_latest(ints: Ints, element: int, asked: int) -> int:
-    """8. 1 where an element was the last to change at this instant, from the state asked for, or has changed often."""
-    last, left, count = NOBODY, NOBODY, 0
+def is_return(ints: Ints, element: int, requested: int) -> int:
+    """8. Return 1 if an element was the last to change, out of the requested state, or has changed too often."""
+    last, left, count = NO_REQUEST, NO_REQUEST, 0
     for k in range(ints[FIRST_CHANGE], ints[CHANGE_COUNT]):
         last = ints[ints[CHANGES] + k * CHANGE_WIDTH]
         left = ints[ints[CHANGES] + k * CHANGE_WIDTH + 2]
-        touched = left == asked or ints[ints[CHANGES] + k * CHANGE_WIDTH + 1] == asked
-        count += 1 if last == element and touched else 0
-    return 1 if (last == element and left == asked) or count > MOST_RETURNS else 0
+        involved = left == requested or ints[ints[CHANGES] + k * CHANGE_WIDTH + 1] == requested
+        count += 1 if last == element and involved else 0
+    return 1 if (last == element and left == requested) or count > MOST_RETURNS else 0
 
 
 @compiled
-def answer(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
-    """WORKED with its phases after those in ``asking`` (c,) have been heard; OK, NEED or FAILED.
+def apply_requests(ints: Ints, numbers: Numbers, waves: Waves, requests: int) -> int:
+    """Set WORKED to the state, with its phases, after the requests (c,) are decided; return OK, NEED or FAILED.
 
-    HEARD: all that touch at this instant. FREED: those of them whose reaction has fallen to zero at it.
+    HEARD flags all contacts that touch at this instant. FREED flags those of them whose reaction has fallen to zero at
+    it.
     """
     c, striking, states = ints[ELEMENTS], ints[STRIKING], ints[ints[WORKED + LEVEL] + STATES]
-    turn_wishes(ints, numbers, asking)
+    set_requested_states(ints, numbers, requests)
     strikes, before = 0, ints[CHANGE_COUNT]
     clear(numbers, LOST_NOW)
-    hear_touching(ints, numbers, asking)
+    flag_touching(ints, numbers, requests)
     for i in range(c):
         rigid = ints[ints[KINDS] + i] == RIGID
         ints[striking + i] = 1 if rigid and ints[ints[HEARD] + i] == 1 and ints[states + i] == OPEN else 0
-        strikes += 1 if ints[striking + i] == 1 and ints[asking + i] != NOBODY else 0
-        asked = ints[states + i] if ints[asking + i] == NOBODY else ints[asking + i]
-        ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else asked
+        strikes += 1 if ints[striking + i] == 1 and ints[requests + i] != NO_REQUEST else 0
+        requested = ints[states + i] if ints[requests + i] == NO_REQUEST else ints[requests + i]
+        ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else requested
         sticks = ints[ints[STICKS] + i]
-        if bears_nothing(ints, numbers, i) == 1 and ints[ints[COMPLIANT_KEY] + i] >= sticks:  # slips, either way
-            begins = ints[states + i] == sticks and asked > sticks
-            ints[ints[COMPLIANT_KEY] + i] = asked if begins else max(ints[states + i], sticks + 1)
+        if (
+            bears_no_impulse(ints, numbers, i) == 1 and ints[ints[COMPLIANT_KEY] + i] >= sticks
+        ):  # slips, in either direction
+            begins = ints[states + i] == sticks and requested > sticks
+            ints[ints[COMPLIANT_KEY] + i] = requested if begins else max(ints[states + i], sticks + 1)
     if strikes == 0:
-        status = stick_together(ints, numbers, waves, asking)
-        left = 0
+        status = stick_together(ints, numbers, waves, requests)
+        remaining = 0
         for i in range(c):
-            left += 1 if ints[asking + i] != NOBODY else 0
-        if status < 0 or left == 0:
+            remaining += 1 if ints[requests + i] != NO_REQUEST else 0
+        if status < 0 or remaining == 0:
             return status
-        return switch(ints, numbers, waves, asking)
+        return switch(ints, numbers, waves, requests)
     status = impact(ints, numbers, waves)
     if status < 0:
         return status
     if ints[CHANGE_COUNT] == before:
         clear(numbers, LOST_NOW)
-        return close_without_impact(ints, numbers, waves, asking)
+        return close_without_impact(ints, numbers, waves, requests)
     enter(ints, numbers, waves, AFTER)
     return OK

@@ -1,12 +1,12 @@
 """Start of a run in flat arrays: from displacement and velocity in all modes of the base to the first state of a level.
 
-The base stands among the levels as one with xi = (y, w), in which all contacts are open. Its key (c,) has the contacts
-that touch or lie inside their stop at the start as closed: the rigid ones touch, the compliant ones penetrate.
+The base stands among the levels as one with xi = (y, w), in which all contacts are open. In its key (c,) the contacts
+that touch their stop at the start, or lie inside it, are closed: rigid ones touch, compliant ones penetrate.
 
     v = y' + H p,   p = argmin |v|,  p >= 0,   of the rigid contacts that touch          (impact.py, in all modes)
     eta = Psi^T (y - y_inf - R w),   eta' = Psi^T (v - Y w')                             (eq. 38.6)
 
-What stays closed of those that touch is decided as at any impact; what is lost is an impact and truncation like any.
+Which touching contacts stay closed is decided as at any impact; the losses are those of an impact and of truncation.
 """
 
 from __future__ import annotations
@@ -56,10 +56,10 @@ from multiphi_exudyn.events.arrays import (
     TRANSITIONS_NOW,
     WORKED,
 )
-from multiphi_exudyn.events.law.changes import NOBODY, bears_nothing, clear
+from multiphi_exudyn.events.law.changes import NO_REQUEST, bears_no_impulse, clear
 from multiphi_exudyn.events.law.decision import decide
-from multiphi_exudyn.events.law.rebounds import collide_and_rebound, rebound
-from multiphi_exudyn.events.law.striking import impact, list_changes
+from multiphi_exudyn.events.law.rebounds import collide_and_rebound, set_rebound_speeds
+from multiphi_exudyn.events.law.striking import impact, record_impact_changes
 from multiphi_exudyn.events.states.energies import lose
 from multiphi_exudyn.events.states.maps import find_level, find_map, move
 from multiphi_exudyn.events.states.state_arrays import copy_state, measure
@@ -71,9 +71,9 @@ __all__ = ["begin"]
 
 @compiled
 def begin(ints: Ints, numbers: Numbers, waves: Waves) -> int:
-    """WORKED becomes the state right after the start; OK, NEED or FAILED.
+    """Set WORKED to the state right after the start; return OK, NEED or FAILED.
 
-    REACHED: the state before anybody was heard. Energies lost are added up in LOST, changes listed.
+    REACHED is the state before any request is decided. The energies lost are summed in LOST, and changes are listed.
     """
     states, count, strikes = ints[ints[GIVEN + LEVEL] + STATES], 0, 0
     enter_start(ints, numbers)
@@ -85,11 +85,11 @@ def begin(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         rigid = ints[ints[KINDS] + i] == RIGID
         ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else ints[states + i]
         sticks = ints[ints[STICKS] + i]
-        if touching > 0 and bears_nothing(ints, numbers, i) == 1 and ints[ints[COMPLIANT_KEY] + i] >= sticks:
-            ints[ints[COMPLIANT_KEY] + i] = max(ints[states + i], sticks + 1)  # in slip, either way
+        if touching > 0 and bears_no_impulse(ints, numbers, i) == 1 and ints[ints[COMPLIANT_KEY] + i] >= sticks:
+            ints[ints[COMPLIANT_KEY] + i] = max(ints[states + i], sticks + 1)  # slips, in either direction
         ints[ints[STRIKING] + i] = ints[states + i] if rigid else OPEN
         ints[ints[FREED] + i] = 0
-        ints[ints[ASKING] + i] = NOBODY
+        ints[ints[ASKING] + i] = NO_REQUEST
         ints[ints[AGAIN] + i] = 0
         count += ints[ints[STRIKING] + i]
     level = find_level(ints, ints[COMPLIANT_KEY])
@@ -119,7 +119,7 @@ def begin(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 
 @compiled
 def enter_start(ints: Ints, numbers: Numbers) -> None:
-    """GIVEN becomes the START-th of the starts in the arrays (start_arrays.py), w and w' what they are now."""
+    """Set GIVEN to start number START in the arrays (start_arrays.py), with the present w and w'."""
     m, q, elements, here = ints[COORDINATES], ints[PRESCRIBED], ints[ELEMENTS], ints[ints[GIVEN + LEVEL] + STATES]
     held, place, speed = ints[CHANNELS] - q, ints[GIVEN + PLACE], ints[GIVEN + SPEED]
     start = ints[STARTS] + ints[START] * (2 * m + held + 1)
@@ -139,9 +139,10 @@ def enter_start(ints: Ints, numbers: Numbers) -> None:
 
 @compiled
 def strike(ints: Ints, numbers: Numbers, waves: Waves, level: int, count: int) -> int:
-    """Those that touch are struck by the given velocity: SLOWED, in all modes; who stays closed: the level of AFTER.
+    """Let the given velocity strike the touching contacts: set SLOWED, in all modes, and AFTER, in a level.
 
-    level: in which all of them are open. 1 where that makes a transition, 0 where not; NEED or FAILED.
+    level: in which all of them are open; AFTER is in that of the contacts that stay closed. Return 1 if this is a
+    transition, 0 if not; NEED or FAILED.
     """
     status = enter_given(ints, numbers, GIVEN, level, WORKED)
     if status >= 0:
@@ -150,18 +151,18 @@ def strike(ints: Ints, numbers: Numbers, waves: Waves, level: int, count: int) -
         return status
     strikes = 1 if ints[CHANGE_COUNT] > 0 else 0
     ints[CHANGE_COUNT] = 0
-    bouncing = rebound(ints, numbers, GIVEN, count)
+    bouncing = set_rebound_speeds(ints, numbers, GIVEN, count)
     if bouncing < 0 or collide_and_rebound(ints, numbers, GIVEN, count, bouncing, SLOWED, LOST_AT_START) < 0:
         return FAILED
-    list_changes(ints, numbers, count)
+    record_impact_changes(ints, numbers, count)
     return strikes
 
 
 @compiled
 def enter_given(ints: Ints, numbers: Numbers, speeds: int, level: int, result: int) -> int:
-    """The displacement of GIVEN and the velocity of ``speeds`` as a state of a level, all armed; OK or NEED.
+    """Map the displacement of GIVEN and the velocity of ``speeds`` into a level, all exits armed; return OK or NEED.
 
-    Where a level is at its own rest there is no round-off of its place.
+    A displacement that is round-off of the level's static equilibrium becomes zero.
     """
     status = move(ints, numbers, GIVEN, speeds, level, result)
     if status < 0:

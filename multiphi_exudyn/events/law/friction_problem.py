@@ -1,4 +1,4 @@
-"""Who is at rest, and the small problem of what pulls them and what friction may bear (sentence 12)."""
+"""Friction elements at rest, and the complementarity problem of their accelerations and forces (sentence 12)."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from multiphi_exudyn.events.arrays import (
     VALUES,
     WORKED,
 )
-from multiphi_exudyn.events.law.changes import NOBODY
+from multiphi_exudyn.events.law.changes import NO_REQUEST
 from multiphi_exudyn.events.law.impact import fill_rows
 from multiphi_exudyn.events.law.impact_round_off import resting_size
 from multiphi_exudyn.events.law.phases import first_exit, opening
@@ -53,12 +53,20 @@ from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compil
 from multiphi_exudyn.mathematics.complementarity.free_rows import norm, product
 from multiphi_exudyn.mathematics.complementarity.principal_pivoting import pose
 
-__all__ = ["at_limit", "key_push", "list_at_rest", "pose_rows", "pressure", "pull", "sort_by_reserve"]
+__all__ = [
+    "at_limit",
+    "list_at_rest",
+    "pose_friction_problem",
+    "pose_rows",
+    "pressure",
+    "slip_force",
+    "sort_by_reserve",
+]
 
 
 @compiled
 def pose_rows(ints: Ints, count: int, r: int, n: int) -> None:
-    """The small problem of ROWS (count, n), with r unknowns."""
+    """Pose the small problem of ROWS (count, n), with r unknowns."""
     for k in range(count):
         ints[ints[LEADERS] + k] = -1
     pose(
@@ -68,52 +76,52 @@ def pose_rows(ints: Ints, count: int, r: int, n: int) -> None:
 
 
 @compiled
-def list_at_rest(ints: Ints, numbers: Numbers, asking: int) -> int:
-    """How many rigid friction elements stick, or ask, or have no speed, where one asks; which: the resting list.
+def list_at_rest(ints: Ints, numbers: Numbers, requests: int) -> int:
+    """List the rigid friction elements that stick, request a change or have no slip velocity, and their links.
 
-    Their links are those that touch.
+    Return their number, or zero if none of them requests a change.
     """
-    states, count, asks = ints[ints[WORKED + LEVEL] + STATES], 0, 0
+    states, count, request_count = ints[ints[WORKED + LEVEL] + STATES], 0, 0
     for i in range(ints[ELEMENTS]):
-        asked = ints[asking + i]
+        requested = ints[requests + i]
         if numbers[ints[LIMITS] + i] > 0.0 and pressure(ints, numbers, i) > 0.0:
             signal = first_exit(ints, ints[WORKED + LEVEL], i) + SIGNAL
-            rests = ints[states + i] == ints[ints[STICKS] + i] or asked != NOBODY
+            rests = ints[states + i] == ints[ints[STICKS] + i] or requested != NO_REQUEST
             if rests or row_sign(ints, numbers, WORKED, signal, 0.0) == 0:
                 ints[ints[RESTING_LIST] + count] = i
                 ints[ints[TOUCHING] + count] = ints[ints[HELD_LINKS] + i]
                 count += 1
-                asks += 1 if asked != NOBODY else 0
-    return count if asks > 0 else 0
+                request_count += 1 if requested != NO_REQUEST else 0
+    return count if request_count > 0 else 0
 
 
 @compiled
 def sort_by_reserve(ints: Ints, numbers: Numbers, count: int) -> None:
-    """12. Those at rest by what they bear beyond their limits: of redundant ones who has most comes to its limit last.
+    """12. Sort the elements at rest by the reserve of their static limit over their limit, the smallest first.
 
-    The others of them push with their limit, and may not bear more.
+    Of redundant elements the one with the largest reserve then reaches its limit last; the others exert their limit.
     """
     level, sizes = ints[ENTERED_STATE + LEVEL], ints[VALUES]
     n = ints[level + MODES] + ints[CHANNELS]
     for k in range(count):
         i = ints[ints[RESTING_LIST] + k]
-        more = numbers[ints[STATIC_LIMITS] + i] - numbers[ints[LIMITS] + i]
+        reserve = numbers[ints[STATIC_LIMITS] + i] - numbers[ints[LIMITS] + i]
         row = ints[level + SPEEDS] + ints[ints[HELD_LINKS] + i] * (n + 1)
-        size = more * pressure(ints, numbers, i) * norm(numbers, row, ints[level + MODES]) if more > 0.0 else 0.0
-        at = k
-        while at > 0 and numbers[sizes + at - 1] > size:
-            numbers[sizes + at] = numbers[sizes + at - 1]
-            ints[ints[RESTING_LIST] + at] = ints[ints[RESTING_LIST] + at - 1]
-            at -= 1
-        numbers[sizes + at] = size
-        ints[ints[RESTING_LIST] + at] = i
+        size = reserve * pressure(ints, numbers, i) * norm(numbers, row, ints[level + MODES]) if reserve > 0.0 else 0.0
+        position = k
+        while position > 0 and numbers[sizes + position - 1] > size:
+            numbers[sizes + position] = numbers[sizes + position - 1]
+            ints[ints[RESTING_LIST] + position] = ints[ints[RESTING_LIST] + position - 1]
+            position -= 1
+        numbers[sizes + position] = size
+        ints[ints[RESTING_LIST] + position] = i
     for k in range(count):
         ints[ints[TOUCHING] + k] = ints[ints[HELD_LINKS] + ints[ints[RESTING_LIST] + k]]
 
 
 @compiled
-def pull(ints: Ints, numbers: Numbers, count: int, asking: int) -> None:
-    """The problem of those at rest: what accelerates them where all of them slip, and what force they may add."""
+def pose_friction_problem(ints: Ints, numbers: Numbers, count: int, requests: int) -> None:
+    """Pose the problem of the elements at rest: accelerations if all of them slip, and bounds of the added forces."""
     level = ints[ENTERED_STATE + LEVEL]
     n = ints[level + MODES] + ints[CHANNELS]
     accelerate(ints, numbers, ENTERED_STATE, ints[ACCELERATION])
@@ -121,12 +129,12 @@ def pull(ints: Ints, numbers: Numbers, count: int, asking: int) -> None:
     fill_rows(ints, numbers, level, ints[TOUCHING], count, 0)
     for k in range(count):
         i, row = ints[ints[RESTING_LIST] + k], ints[ROWS] + k * n
-        presses, forward = pressure(ints, numbers, i), ints[ints[STICKS] + i] + SLIP_FORWARD
-        limit, most = presses * numbers[ints[LIMITS] + i], presses * numbers[ints[STATIC_LIMITS] + i]
-        slipped = key_push(ints, i, limit)
-        low, high = slipped - most, slipped + most
-        if most <= limit and at_limit(ints, numbers, i, ints[asking + i]) == 1:  # and rises
-            low = slipped - limit if ints[asking + i] == forward else slipped + limit
+        normal, forward = pressure(ints, numbers, i), ints[ints[STICKS] + i] + SLIP_FORWARD
+        limit, static_limit = normal * numbers[ints[LIMITS] + i], normal * numbers[ints[STATIC_LIMITS] + i]
+        force_of_slip = slip_force(ints, i, limit)
+        low, high = force_of_slip - static_limit, force_of_slip + static_limit
+        if static_limit <= limit and at_limit(ints, numbers, i, ints[requests + i]) == 1:  # the force would exceed it
+            low = force_of_slip - limit if ints[requests + i] == forward else force_of_slip + limit
             high = low
         numbers[ints[LOWEST] + k] = low
         numbers[ints[HIGHEST] + k] = high
@@ -138,8 +146,8 @@ def pull(ints: Ints, numbers: Numbers, count: int, asking: int) -> None:
 
 
 @compiled
-def key_push(ints: Ints, element: int, limit: float) -> float:
-    """With what force against +h an element pushes that does not stick, in the level of ENTERED_STATE; zero if idle."""
+def slip_force(ints: Ints, element: int, limit: float) -> float:
+    """Return the friction force along -h of an element that slips in the level of ENTERED_STATE, zero if idle."""
     way = ints[ints[KEY] + element] - ints[ints[STICKS] + element]
     if way == IDLE:
         return 0.0
@@ -148,7 +156,10 @@ def key_push(ints: Ints, element: int, limit: float) -> float:
 
 @compiled
 def pressure(ints: Ints, numbers: Numbers, element: int) -> float:
-    """What the limits of friction are to be multiplied by in WORKED: N of a contact, zero where it is round-off."""
+    """Return the factor of an element's friction limits in WORKED: the normal force N, zero if it is round-off, or 1.
+
+    It is 1 for friction that is no part of a contact, whose limits are forces.
+    """
     level, x, v = ints[WORKED + LEVEL], ints[WORKED + PLACE], ints[WORKED + SPEED]
     if ints[ints[KINDS] + element] == SLIDING:
         return 1.0
@@ -163,11 +174,11 @@ def pressure(ints: Ints, numbers: Numbers, element: int) -> float:
 
 
 @compiled
-def at_limit(ints: Ints, numbers: Numbers, element: int, asked: int) -> int:
-    """1 where an element that sticks asks to slip, with what it bears at its limit, and not beyond it."""
+def at_limit(ints: Ints, numbers: Numbers, element: int, requested: int) -> int:
+    """Return 1 if an element that sticks requests to slip with a force at its limit, and not beyond it."""
     level = ints[WORKED + LEVEL]
     sticks = ints[ints[STICKS] + element]
-    if ints[ints[level + STATES] + element] != sticks or asked == NOBODY:
+    if ints[ints[level + STATES] + element] != sticks or requested == NO_REQUEST:
         return 0
-    exit_ = first_exit(ints, level, element) + (asked - sticks - SLIP_FORWARD) * EXIT_INTS
+    exit_ = first_exit(ints, level, element) + (requested - sticks - SLIP_FORWARD) * EXIT_INTS
     return 1 if row_sign(ints, numbers, WORKED, exit_ + SIGNAL, 0.0) == 0 else 0

@@ -58,29 +58,32 @@ from multiphi_exudyn.mathematics.complementarity.free_rows import EXCLUDED_ROWS,
 from multiphi_exudyn.mathematics.complementarity.principal_pivoting import EXCLUDED, UNDECIDED, pose, solve
 from multiphi_exudyn.mathematics.round_off import ZERO
 
-__all__ = ["IMMOVABLE", "RESTING", "collide", "fill_rows", "nearest", "rub"]
+__all__ = ["IMMOVABLE", "RESTING", "add_friction_rows", "collide", "fill_rows", "least_change"]
 
-RESTING = 1e-12  # of what it could be at such speeds: a gap velocity below it is zero right after an impact
-IMMOVABLE = 1e-11  # of a contact's mobility: below it what hangs on the structure holds the contact
+RESTING = 1e-12  # relative to its possible size at such velocities: a smaller gap velocity after an impact is zero
+IMMOVABLE = 1e-11  # of a contact's mobility: below it attached bodies prevent any motion of the contact
 
 
 @compiled
 def fill_rows(ints: Ints, numbers: Numbers, level: int, contacts: int, count: int, held: int) -> None:
-    """Gap velocities (count + held, n) from xi', of the last ``held`` contacts with the opposite sign."""
+    """Fill ROWS (count + held, n) with gap velocities as functions of xi', the last ``held`` with opposite sign."""
     n = ints[level + MODES] + ints[CHANNELS]
     for k in range(count + held):
         sign = 1.0 if k < count else -1.0
-        row, own = ints[ROWS] + k * n, ints[level + SPEEDS] + ints[contacts + k] * (n + 1)
+        row, speeds = ints[ROWS] + k * n, ints[level + SPEEDS] + ints[contacts + k] * (n + 1)
         for i in range(n):
-            numbers[row + i] = sign * numbers[own + i]
+            numbers[row + i] = sign * numbers[speeds + i]
 
 
 @compiled
-def rub(ints: Ints, numbers: Numbers, state: int, contacts: int, count: int, first: int, released: int) -> int:
-    """10. How many rows there are with those, after ``first`` ones, along which contacts (count,) rub.
+def add_friction_rows(
+    ints: Ints, numbers: Numbers, state: int, contacts: int, count: int, first: int, released: int
+) -> int:
+    """10. Append rows of tangential velocities of contacts (count,) behind ``first`` rows; return the number of rows.
 
-    An impulse along such a row is led by that of its contact. released: -1, or the state before an impact, where it is
-    forces at rest that are asked for: who slides after it then has no row, but pushes with its friction as well.
+    The impulse along such a row is limited by that of its contact. released: -1 for an impact. For forces at rest it is
+    the state before the impact: a contact that slides after it then has no row, but its normal force brings friction
+    with it.
     """
     level, rows, pushing, mu = ints[state + LEVEL], first, ints[PUSHING], ints[FRICTIONS]
     n = ints[level + MODES] + ints[CHANNELS]
@@ -88,20 +91,20 @@ def rub(ints: Ints, numbers: Numbers, state: int, contacts: int, count: int, fir
         numbers[pushing + i] = numbers[ints[ROWS] + i]
     for k in range(count):
         contact, slips = ints[contacts + k], 0
-        along = ints[level + SPEEDS] + ints[ints[HELD_LINKS] + contact] * (n + 1)
+        tangential = ints[level + SPEEDS] + ints[ints[HELD_LINKS] + contact] * (n + 1)
         ints[ints[ENTERS] + contact] = CLOSE
         if numbers[ints[STATIC_FRICTIONS] + contact] == 0.0:
             continue
         if released >= 0:
-            slips = slip_sign(ints, numbers, state, released, along)
+            slips = slip_sign(ints, numbers, state, released, tangential)
         if slips != 0:
             ints[ints[ENTERS] + contact] = CLOSE + 1 if slips > 0 else CLOSE + 2
             for i in range(n):
-                numbers[pushing + k * n + i] -= slips * numbers[mu + contact] * numbers[along + i]
+                numbers[pushing + k * n + i] -= slips * numbers[mu + contact] * numbers[tangential + i]
             continue
         for i in range(n):
-            numbers[ints[ROWS] + rows * n + i] = numbers[along + i]
-            numbers[pushing + rows * n + i] = numbers[along + i]
+            numbers[ints[ROWS] + rows * n + i] = numbers[tangential + i]
+            numbers[pushing + rows * n + i] = numbers[tangential + i]
         ints[ints[LEADERS] + rows] = k
         numbers[ints[RATIOS] + rows] = numbers[(mu if released < 0 else ints[STATIC_FRICTIONS]) + contact]
         rows += 1
@@ -110,7 +113,7 @@ def rub(ints: Ints, numbers: Numbers, state: int, contacts: int, count: int, fir
 
 @compiled
 def slip_sign(ints: Ints, numbers: Numbers, state: int, released: int, row: int) -> int:
-    """Sign of the speed along a row after an impact, zero where it is round-off of what it could be."""
+    """Return the sign of the velocity along a row after an impact, zero if it is round-off."""
     n, size = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], speed_size(ints, numbers, state, row)
     speed = product(numbers, row, ints[state + SPEED], n)
     if abs(speed) <= RESTING * (size + speed_size(ints, numbers, released, row)):
@@ -119,7 +122,7 @@ def slip_sign(ints: Ints, numbers: Numbers, state: int, released: int, row: int)
 
 
 @compiled
-def nearest(
+def least_change(
     ints: Ints,
     numbers: Numbers,
     level: int,
@@ -132,11 +135,11 @@ def nearest(
     least: int,
     multipliers: int,
 ) -> int:
-    """The change (r,) that makes ``vector`` (n,) admissible, rows v >= wanted, its multipliers (rows,); OK or FAILED.
+    """Solve for the smallest change (r,) of ``vector`` v (n,) with rows v >= wanted; return OK or FAILED.
 
-    sizes: (rows,) of the terms of rows v beside those of v itself, -1 for none. wanted: (count,), -1 for zero. least:
-    (count,) of the contacts' multipliers, -1 for zero. The first ``count`` rows are those of the contacts, the others
-    of their friction.
+    multipliers: those of the rows (rows,). sizes: (rows,) terms of rows v besides those of v itself, -1 for none.
+    wanted: (count,), -1 for zero. least: lower bounds (count,) of the contacts' multipliers, -1 for zero. The first
+    ``count`` rows are those of the contacts, the others those of their friction.
     """
     r = ints[level + MODES]
     n = r + ints[CHANNELS]
@@ -149,13 +152,13 @@ def nearest(
             pushed = numbers[least + j] * product(numbers, row, ints[ROWS] + j * n, r)
             value += pushed
             terms += abs(pushed)
-        rubs = 0.0
+        friction_bound = 0.0
         if least >= 0 and k >= count:
-            rubs = numbers[ints[RATIOS] + k] * numbers[least + ints[ints[LEADERS] + k]]
+            friction_bound = numbers[ints[RATIOS] + k] * numbers[least + ints[ints[LEADERS] + k]]
         numbers[ints[VALUES] + k] = value - numbers[wanted + k] if wanted >= 0 and k < count else value
         numbers[ints[VALUE_SIZES] + k] = terms + (numbers[sizes + k] if sizes >= 0 else 0.0)
-        numbers[ints[LOWEST] + k] = -rubs
-        numbers[ints[HIGHEST] + k] = math.inf if k < count else rubs
+        numbers[ints[LOWEST] + k] = -friction_bound
+        numbers[ints[HIGHEST] + k] = math.inf if k < count else friction_bound
         ints[ints[LEADERS] + k] = -1 if k < count else ints[ints[LEADERS] + k]
     if ints[level + MOBILITY] >= 0:
         limit_rows(ints, numbers, level, count)
@@ -164,8 +167,8 @@ def nearest(
         ints, problem, rows, r, n, ints[ROWS], ints[PUSHING], ints[VALUES], ints[VALUE_SIZES], ints[LOWEST],
         ints[HIGHEST], ints[LEADERS], ints[RATIOS], ints[CHANGE], multipliers,
     )  # fmt: skip
-    answer = solve(ints, numbers, problem, 0)
-    if answer == EXCLUDED:
+    outcome = solve(ints, numbers, problem, 0)
+    if outcome == EXCLUDED:
         ints[CAUSE] = SQUEEZED
         for i in range(ints[ELEMENTS]):
             ints[ints[CAUSED_BY] + i] = 0
@@ -173,7 +176,7 @@ def nearest(
             row = ints[ints[problem + EXCLUDED_ROWS] + k]
             ints[ints[CAUSED_BY] + ints[contacts + (row if row < count else ints[ints[LEADERS] + row])]] = 1
         return FAILED
-    if answer == UNDECIDED:
+    if outcome == UNDECIDED:
         ints[CAUSE] = UNSETTLED
         return FAILED
     for j in range(count if least >= 0 else 0):
@@ -187,33 +190,33 @@ def nearest(
 
 @compiled
 def limit_rows(ints: Ints, numbers: Numbers, level: int, count: int) -> None:
-    """Rows (count, r) become rows F; of a contact that cannot move for what hangs on the structure nothing is asked."""
-    r, moved = ints[level + MODES], ints[CHANGE]
+    """Replace rows (count, r) by rows F; a contact that cannot move for attached bodies has no condition."""
+    r, limited = ints[level + MODES], ints[CHANGE]
     n = r + ints[CHANNELS]
     for k in range(count):
-        row, before, left = ints[ROWS] + k * n, norm(numbers, ints[ROWS] + k * n, r), 0.0
+        row, length, limited_length = ints[ROWS] + k * n, norm(numbers, ints[ROWS] + k * n, r), 0.0
         for j in range(r):
-            numbers[moved + j] = 0.0
+            numbers[limited + j] = 0.0
             for i in range(r):
-                numbers[moved + j] += numbers[row + i] * numbers[ints[level + MOBILITY] + i * r + j]
-        left = norm(numbers, moved, r)
-        held = left * left <= IMMOVABLE * before * before
+                numbers[limited + j] += numbers[row + i] * numbers[ints[level + MOBILITY] + i * r + j]
+        limited_length = norm(numbers, limited, r)
+        held = limited_length * limited_length <= IMMOVABLE * length * length
         for j in range(r):
-            numbers[row + j] = 0.0 if held else numbers[moved + j]
+            numbers[row + j] = 0.0 if held else numbers[limited + j]
         if held:
             numbers[ints[VALUES] + k] = 0.0
 
 
 @compiled
 def limit_change(ints: Ints, numbers: Numbers, level: int) -> None:
-    """The change z (r,) becomes F z."""
-    r, given = ints[level + MODES], ints[MOVED]
+    """Replace the change z (r,) by F z."""
+    r, z = ints[level + MODES], ints[MOVED]
     for i in range(r):
-        numbers[given + i] = numbers[ints[CHANGE] + i]
+        numbers[z + i] = numbers[ints[CHANGE] + i]
     for i in range(r):
         numbers[ints[CHANGE] + i] = 0.0
         for j in range(r):
-            numbers[ints[CHANGE] + i] += numbers[ints[level + MOBILITY] + i * r + j] * numbers[given + j]
+            numbers[ints[CHANGE] + i] += numbers[ints[level + MOBILITY] + i * r + j] * numbers[z + j]
 
 
 @compiled
@@ -230,20 +233,21 @@ def collide(
     impulses: int,
     losses: int,
 ) -> int:
-    """2. The state after Moreau's impact, in a level in which the contacts are open; adds its losses; OK or FAILED.
+    """2. Compute Moreau's impact in a level in which the contacts are open, and add its losses; return OK or FAILED.
 
-    held: the last so many contacts keep no speed away from their stop either. wanted: gap velocities (count + held,)
-    that they are to have at least, -1 for zero. least: impulses that they have at least, the same. impulses: (count +
-    held,) [N s], those of friction behind them.
-    What is left of a speed that the impact has taken away but for round-off would bounce and rock on until it
-    underflows, and what is left of a place where it has come to rest would swing, and strike again: both become zero.
+    held: the number of last contacts that get no velocity away from their stop either. wanted: their lower bounds of
+    gap velocities (count + held,), -1 for zero. least: lower bounds of impulses, the same. impulses: (count + held,) [N
+    s], those of friction behind them.
+
+    Velocities that the impact has reduced to round-off are set to zero, as the contact would bounce and rock with them
+    until they underflow. So are displacements that are round-off, as they would swing and strike again.
     """
     level = ints[state + LEVEL]
     r, channels = ints[level + MODES], ints[CHANNELS]
     n, both, plastic = r + channels, count + held, 0.0
     fill_rows(ints, numbers, level, contacts, count, held)
-    rows = rub(ints, numbers, state, contacts, count if held == 0 else 0, both, -1)
-    if nearest(ints, numbers, level, contacts, both, rows, ints[state + SPEED], -1, wanted, least, impulses) < 0:
+    rows = add_friction_rows(ints, numbers, state, contacts, count if held == 0 else 0, both, -1)
+    if least_change(ints, numbers, level, contacts, both, rows, ints[state + SPEED], -1, wanted, least, impulses) < 0:
         return FAILED
     for k in range(rows if least >= 0 else 0):
         numbers[ints[VALUES] + k] = product(numbers, ints[ROWS] + k * n, ints[state + SPEED], n)
@@ -258,9 +262,9 @@ def collide(
     for k in range(both if least < 0 else 0, rows):
         after = product(numbers, ints[ROWS] + k * n, v, n)
         plastic -= 0.5 * numbers[impulses + k] * (numbers[ints[VALUES] + k] + after)
-    rest = norm(numbers, v, r) <= RESTING * norm(numbers, before, r)
+    stopped = norm(numbers, v, r) <= RESTING * norm(numbers, before, r)
     for i in range(r):
-        if rest or abs(numbers[v + i]) <= RESTING * abs(numbers[before + i]):
+        if stopped or abs(numbers[v + i]) <= RESTING * abs(numbers[before + i]):
             numbers[v + i] = 0.0
             if abs(numbers[x + i]) <= ZERO * numbers[reach + i]:
                 numbers[x + i] = 0.0

@@ -1,4 +1,4 @@
-"""What is round-off of a speed, or of a displacement, where an impact or contact at rest is decided (sentence 9)."""
+"""Round-off of velocities and accelerations, where an impact or contact at rest is decided (sentence 9)."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compil
 from multiphi_exudyn.mathematics.complementarity.free_rows import norm
 from multiphi_exudyn.mathematics.round_off import ZERO
 
-__all__ = ["resting_size", "speed_size", "unseen_speed"]
+__all__ = ["negligible_speed", "resting_size", "speed_size"]
 
 
 @compiled
 def speed_size(ints: Ints, numbers: Numbers, state: int, row: int) -> float:
-    """What a gap velocity could be at the speeds of a state, whose directions an impact mixes."""
+    """Return the size of a gap velocity at the velocities of a state, whose directions an impact mixes."""
     r, q, v = ints[ints[state + LEVEL] + MODES], ints[CHANNELS], ints[state + SPEED]
     prescribed = 0.0
     for k in range(r, r + q):
@@ -31,10 +31,10 @@ def speed_size(ints: Ints, numbers: Numbers, state: int, row: int) -> float:
 
 
 @compiled
-def unseen_speed(ints: Ints, numbers: Numbers, state: int, contact: int, row: int) -> float:
-    """Gap velocity that the free motion turns back before the gap is more than round-off of its terms.
+def negligible_speed(ints: Ints, numbers: Numbers, state: int, contact: int, row: int) -> float:
+    """Return the largest gap velocity that the free motion reverses before the gap is more than round-off of its terms.
 
-    xi'' of the state stands in the accelerations.
+    ACCELERATION must hold xi'' of the state.
     """
     level, x = ints[state + LEVEL], ints[state + PLACE]
     n = ints[level + MODES] + ints[CHANNELS]
@@ -48,7 +48,7 @@ def unseen_speed(ints: Ints, numbers: Numbers, state: int, contact: int, row: in
 
 @compiled
 def resting_size(numbers: Numbers, one: int, other: int, row: int, n: int) -> float:
-    """Of which terms a gap's acceleration is the sum, in the larger of two states' sizes (n,)."""
+    """Return the sum of the terms of a gap's acceleration, with the larger of two states' sizes (n,)."""
     total = 0.0
     for i in range(n):
         total += abs(numbers[row + i]) * max(numbers[one + i], numbers[other + i])

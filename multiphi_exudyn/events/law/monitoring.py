@@ -1,7 +1,7 @@
-"""Waiting: for which signals a motion waits, and who asks when they fall, by sentences 1, 5 and 6 of the law.
+"""Monitoring: the signals that a motion is searched for, and the requests when they fall (sentences 1, 5 and 6).
 
-The first descent of a signal, of its opposite or of its rate through zero (zero_crossing.py) makes an exit ask, or
-arms it.
+The first descent through zero of a signal, of its negative or of its rate (zero_crossing.py) makes an exit request a
+change, or arms it.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from multiphi_exudyn.events.arrays import (
     WAITING,
     WORK_WAVES,
 )
-from multiphi_exudyn.events.law.changes import NOBODY
+from multiphi_exudyn.events.law.changes import NO_REQUEST
 from multiphi_exudyn.events.law.phases import entered_signal
 from multiphi_exudyn.events.states.flow import signal_waves
 from multiphi_exudyn.events.states.signals import held_part, mapped_terms
@@ -59,9 +59,10 @@ __all__ = ["arm", "flag_again", "watch", "who_asks"]
 
 @compiled
 def watch(ints: Ints, numbers: Numbers, waves: Waves) -> int:
-    """1, 5, 6. Signals whose first descent is next, of the flow from CURRENT; how many, or NEED.
+    """1, 5, 6. List the signals of the flow from CURRENT whose first descent is searched; return their number, or NEED.
 
-    Of each the exit, and whether that then asks or is armed, in WAITING. The phases are those of REACHED.
+    WAITING holds the exit of each, and whether it then requests a change (1) or is armed (0). The phases are those of
+    REACHED.
     """
     level, phases, count = ints[CURRENT + LEVEL], ints[REACHED + PHASES], 0
     for k in range(ints[level + EXIT_COUNT]):
@@ -134,10 +135,10 @@ def wait_for(
 
 @compiled
 def who_asks(ints: Ints, numbers: Numbers, waves: Waves, count: int, found: int, reached: float) -> int:
-    """1. ASKING: of the elements whose signals fall at an instant those that then ask; how many."""
+    """1. Set ASKING: the requests of elements whose signals fall through zero at an instant; return their number."""
     level, flags, waiting, asking = ints[CURRENT + LEVEL], ints[FALLEN], ints[WAITING], 0
     for i in range(ints[ELEMENTS]):
-        ints[ints[ASKING] + i] = NOBODY
+        ints[ints[ASKING] + i] = NO_REQUEST
     if ints[level + EXIT_COUNT] > 1:
         simultaneous(
             ints, numbers, waves, ints[FLOW_BASIS], ints[SIGNALS], ints[CONSTANTS], count, found, reached,
@@ -156,7 +157,7 @@ def who_asks(ints: Ints, numbers: Numbers, waves: Waves, count: int, found: int,
 
 @compiled
 def arm(ints: Ints, exit_number: int) -> None:
-    """An exit of the state REACHED is armed."""
+    """Arm an exit of the state REACHED."""
     phases, settled = ints[REACHED + PHASES], 1
     ints[phases + exit_number] = ARMED
     for k in range(ints[ints[REACHED + LEVEL] + EXIT_COUNT]):
@@ -167,11 +168,11 @@ def arm(ints: Ints, exit_number: int) -> None:
 
 @compiled
 def flag_again(ints: Ints, at_once: int) -> None:
-    """6. AGAIN: who asks at the instant at which it was refused before."""
+    """6. Set AGAIN: elements that request a change at the same instant at which they were refused."""
     phases, exits = ints[REACHED + PHASES], ints[ints[REACHED + LEVEL] + EXITS]
     for i in range(ints[ELEMENTS]):
         ints[ints[AGAIN] + i] = 0
     for k in range(ints[ints[REACHED + LEVEL] + EXIT_COUNT]):
         element = ints[exits + k * EXIT_INTS + ELEMENT]
-        if at_once == 1 and ints[ints[ASKING] + element] != NOBODY and ints[phases + k] == REFUSED:
+        if at_once == 1 and ints[ints[ASKING] + element] != NO_REQUEST and ints[phases + k] == REFUSED:
             ints[ints[AGAIN] + element] = 1

@@ -1,4 +1,4 @@
-"""Phases: how every exit of a state stands, by sentences 1, 5 and 6 of the law (decision.py).
+"""Phases: what every exit of a state waits for, by sentences 1, 5 and 6 of the law (decision.py).
 
 An exit is ARMED, RECOVERING, REFUSED or HELD_BACK. s is its signal.
 """
@@ -99,7 +99,7 @@ def becomes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal: int,
 
 @compiled
 def update_phases(ints: Ints, numbers: Numbers, waves: Waves, state: int, refused: int) -> None:
-    """6. The phase in which every exit of a state stands; refused: flags of those that asked in vain, -1 for none."""
+    """6. Set the phase of every exit of a state; refused: flags of elements with refused requests, -1 for none."""
     level, phases = ints[state + LEVEL], ints[state + PHASES]
     count, exits, settled = ints[level + EXIT_COUNT], ints[level + EXITS], 1
     for k in range(count):
@@ -117,7 +117,7 @@ def update_phases(ints: Ints, numbers: Numbers, waves: Waves, state: int, refuse
 
 @compiled
 def is_denied(ints: Ints, state: int, element: int) -> int:
-    """4, 10. 1 where an exit of an element is refused but for those that are always taken: they follow at once."""
+    """4, 10. Return 1 if an exit of an element is refused, unless it is always taken: such exits follow at once."""
     level = ints[state + LEVEL]
     first = ints[level + FIRST_EXITS] + element
     for k in range(ints[first], ints[first + 1]):
@@ -129,7 +129,7 @@ def is_denied(ints: Ints, state: int, element: int) -> int:
 
 @compiled
 def is_refused(ints: Ints, state: int, element: int) -> int:
-    """1 where an exit of an element is refused."""
+    """Return 1 if an exit of an element is refused."""
     first = ints[ints[state + LEVEL] + FIRST_EXITS] + element
     for k in range(ints[first], ints[first + 1]):
         if ints[ints[state + PHASES] + k] == REFUSED:
@@ -139,7 +139,7 @@ def is_refused(ints: Ints, state: int, element: int) -> int:
 
 @compiled
 def is_pulled(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> int:
-    """3. 1 where a rigid contact would be pulled if a state went on as it is."""
+    """3. Return 1 if the motion from a state would pull a rigid contact."""
     level = ints[state + LEVEL]
     for k in range(ints[level + EXIT_COUNT]):
         exit_ = ints[level + EXITS] + k * EXIT_INTS
@@ -151,7 +151,7 @@ def is_pulled(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> int:
 
 @compiled
 def hold_back(ints: Ints, state: int) -> None:
-    """6. Those that were refused at this instant before, and are once more, wait until s has risen to zero."""
+    """6. Hold back refused exits of elements that were refused before at this instant, until s rises to zero."""
     level = ints[state + LEVEL]
     for k in range(ints[level + EXIT_COUNT]):
         element = ints[ints[level + EXITS] + k * EXIT_INTS + ELEMENT]
@@ -162,10 +162,11 @@ def hold_back(ints: Ints, state: int) -> None:
 
 @compiled
 def keep_entered(ints: Ints, numbers: Numbers) -> None:
-    """An exit that is always taken is armed where it leads back to where the instant began, and its signal is zero.
+    """Arm exits that are always taken, have a zero signal and lead back to the state before the instant.
 
-    The signal that brought the element here was zero too: what either says beyond that is round-off. A rigid contact
-    that is left without reaction opens nevertheless, and so does what others have brought here.
+    The signal by which the element came here was zero too: what either signal says beyond that is round-off. This does
+    not concern a rigid contact that is left without a reaction, which opens, nor an element that other elements
+    changed.
     """
     level, before = ints[WORKED + LEVEL], ints[ints[REACHED + LEVEL] + STATES]
     for k in range(ints[level + EXIT_COUNT]):
@@ -181,13 +182,13 @@ def keep_entered(ints: Ints, numbers: Numbers) -> None:
 
 @compiled
 def first_exit(ints: Ints, level: int, element: int) -> int:
-    """The first exit of an element in a level."""
+    """Return the record of the first exit of an element in a level."""
     return ints[level + EXITS] + ints[ints[level + FIRST_EXITS] + element] * EXIT_INTS
 
 
 @compiled
 def opening(ints: Ints, level: int, element: int) -> int:
-    """The exit of a closed contact by which it opens."""
+    """Return the record of the exit by which a closed contact opens."""
     k = ints[ints[level + FIRST_EXITS] + element]
     while ints[ints[level + EXITS] + k * EXIT_INTS + ASKED] != OPEN:
         k += 1
@@ -196,7 +197,7 @@ def opening(ints: Ints, level: int, element: int) -> int:
 
 @compiled
 def entered_signal(ints: Ints, level: int, exit_: int) -> int:
-    """The signal that an exit's element would have in the level entered alone; or NEED."""
+    """Return the signal that an element would have in the level that its exit alone enters; or NEED."""
     if ints[exit_ + ENTERED] < 0:
         ints[NEEDED] = NEED_ENTERED
         ints[NEEDED_FROM] = level

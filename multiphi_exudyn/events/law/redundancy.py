@@ -1,4 +1,4 @@
-"""Redundant contacts: of those that would close an independent set does, by sentence 2 of the law (decision.py)."""
+"""Redundant contacts and friction: only an independent set of links holds (sentences 2 and 12 of the law)."""
 
 from __future__ import annotations
 
@@ -23,108 +23,111 @@ from multiphi_exudyn.events.arrays import (
     UNION,
     WORKED,
 )
-from multiphi_exudyn.events.law.changes import NOBODY, without_stick
+from multiphi_exudyn.events.law.changes import NO_REQUEST, state_without_stick
 from multiphi_exudyn.events.law.phases import is_refused
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.complementarity.free_rows import norm
 
-__all__ = ["follows", "held_links", "independent", "join", "thin_out"]
+__all__ = ["are_independent", "drop_redundant_stick", "held_links", "is_redundant_stick", "keep_independent"]
 
 
 @compiled
-def join(ints: Ints, numbers: Numbers, closing: int) -> int:
-    """2. Leave in ``closing`` (c,) those that can close beside HELD and each other, penetrating ones first; how many.
+def keep_independent(ints: Ints, numbers: Numbers, closing: int) -> int:
+    """2. Keep in ``closing`` (c,) contacts that are independent beside HELD, penetrating ones first; return how many.
 
-    Of redundant contacts a set that is independent carries all. Between two stops without clearance the one on which
-    nothing presses would keep the other out.
+    Of redundant contacts an independent set carries all forces. Between two stops without clearance, an unloaded
+    contact would otherwise keep the loaded one open.
     """
-    c, union, joined, left = ints[ELEMENTS], ints[UNION], ints[JOINED], 0
+    c, union, joined, count = ints[ELEMENTS], ints[UNION], ints[JOINED], 0
     for i in range(c):
         ints[union + i] = max(ints[ints[HELD] + i], ints[closing + i])
-        left += ints[closing + i]
-    if independent(ints, numbers, union) == 1:
-        return left
+        count += ints[closing + i]
+    if are_independent(ints, numbers, union) == 1:
+        return count
     for i in range(c):
         ints[union + i] = ints[ints[HELD] + i]
         ints[joined + i] = 0
-    left = 0
+    count = 0
     for penetrating in range(1, -1, -1):
         for i in range(c):
             if ints[closing + i] == 1 and is_refused(ints, WORKED, i) == penetrating:
-                taken = ints[union + i]
+                before = ints[union + i]
                 ints[union + i] = 1
-                if independent(ints, numbers, union) == 1:
+                if are_independent(ints, numbers, union) == 1:
                     ints[joined + i] = 1
-                    left += 1
+                    count += 1
                 else:
-                    ints[union + i] = taken
+                    ints[union + i] = before
     for i in range(c):
         ints[closing + i] = ints[joined + i]
-    return left
+    return count
 
 
 @compiled
 def held_links(ints: Ints, numbers: Numbers, element: int, state: int) -> int:
-    """Which links a state holds without a spring: 1 an element's first, of a rigid contact, 2 that of friction."""
+    """Return the links of an element that a state holds without a spring: 1 the first, 2 that of friction, 3 both.
+
+    The first link holds in a closed rigid contact.
+    """
     first = 1 if ints[ints[KINDS] + element] == RIGID and state != OPEN else 0
-    rubs = numbers[ints[SPRINGS] + element] == 0.0 and ints[ints[STICKS] + element] >= 0
-    return first + 2 if rubs and state == ints[ints[STICKS] + element] else first
+    has_friction = numbers[ints[SPRINGS] + element] == 0.0 and ints[ints[STICKS] + element] >= 0
+    return first + 2 if has_friction and state == ints[ints[STICKS] + element] else first
 
 
 @compiled
-def follows(ints: Ints, numbers: Numbers, key: int, element: int) -> int:
-    """12. 1 where friction sticks in the level with a key, and cannot move for what else is held there."""
+def is_redundant_stick(ints: Ints, numbers: Numbers, key: int, element: int) -> int:
+    """12. Return 1 if friction sticks in the level with a key, and the other links held prevent its slip anyway."""
     if held_links(ints, numbers, element, ints[key + element]) < 2:
         return 0
     for i in range(ints[ELEMENTS]):
         ints[ints[UNION] + i] = held_links(ints, numbers, i, ints[key + i])
-    return 1 - independent(ints, numbers, ints[UNION])
+    return 1 - are_independent(ints, numbers, ints[UNION])
 
 
 @compiled
-def thin_out(ints: Ints, numbers: Numbers, wishes: int) -> None:
-    """12. Of friction elements that wish to stick each stays that does not follow from those that are held already."""
+def drop_redundant_stick(ints: Ints, numbers: Numbers, targets: int) -> None:
+    """12. Remove requests to stick of friction elements whose slip the links that hold already prevent."""
     union, states = ints[UNION], ints[ints[WORKED + LEVEL] + STATES]
     for i in range(ints[ELEMENTS]):
         held = held_links(ints, numbers, i, ints[states + i])
-        ints[union + i] = held if ints[wishes + i] == NOBODY else held % 2
+        ints[union + i] = held if ints[targets + i] == NO_REQUEST else held % 2
     for i in range(ints[ELEMENTS]):
-        held, before = held_links(ints, numbers, i, ints[wishes + i]), ints[union + i]
-        if ints[wishes + i] != NOBODY and held >= 2:
+        held, before = held_links(ints, numbers, i, ints[targets + i]), ints[union + i]
+        if ints[targets + i] != NO_REQUEST and held >= 2:
             ints[union + i] = held
-            if independent(ints, numbers, union) == 0:
+            if are_independent(ints, numbers, union) == 0:
                 ints[union + i] = before
                 slips = ints[states + i] > ints[ints[STICKS] + i]
-                ints[wishes + i] = NOBODY if slips else without_stick(ints, i, ints[states + i])
+                ints[targets + i] = NO_REQUEST if slips else state_without_stick(ints, i, ints[states + i])
 
 
 @compiled
-def independent(ints: Ints, numbers: Numbers, flags: int) -> int:
-    """1 where of the links with a flag none follows from the others, so that they can be held together.
+def are_independent(ints: Ints, numbers: Numbers, flags: int) -> int:
+    """Return 1 if no direction of the flagged links depends on the others, so that all can be held together.
 
-    Flags (c,) of elements: 1 for the first link, 2 for the one that friction holds, 3 for both.
+    Flags (c,) of elements: 1 for the first link, 2 for the link of friction, 3 for both.
     """
-    m, found, smallest = ints[COORDINATES], 0, math.inf
+    m, rank, smallest = ints[COORDINATES], 0, math.inf
     q = ints[JOIN_NUMBERS]
     for k in range(2 * ints[ELEMENTS]):
         i, link = k // 2, k // 2 if k % 2 == 0 else ints[ints[HELD_LINKS] + k // 2]
         if ints[flags + i] % 2 != 1 if k % 2 == 0 else ints[flags + i] < 2:
             continue
-        if found == m:
+        if rank == m:
             return 0
-        own = q + found * m
+        direction = q + rank * m
         for j in range(m):
-            numbers[own + j] = numbers[ints[DIRECTIONS] + link * m + j]
+            numbers[direction + j] = numbers[ints[DIRECTIONS] + link * m + j]
         for _ in range(2):
-            for b in range(found):
+            for b in range(rank):
                 product = 0.0
                 for i in range(m):
-                    product += numbers[q + b * m + i] * numbers[own + i]
+                    product += numbers[q + b * m + i] * numbers[direction + i]
                 for i in range(m):
-                    numbers[own + i] -= product * numbers[q + b * m + i]
-        length = norm(numbers, own, m)
+                    numbers[direction + i] -= product * numbers[q + b * m + i]
+        length = norm(numbers, direction, m)
         smallest = min(smallest, length)
         for i in range(m):
-            numbers[own + i] /= length if length > 0.0 else 1.0
-        found += 1
+            numbers[direction + i] /= length if length > 0.0 else 1.0
+        rank += 1
     return 1 if smallest > numbers[INDEPENDENCE] else 0

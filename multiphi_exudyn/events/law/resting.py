@@ -1,7 +1,7 @@
 """Rigid contacts at rest right after an impact: which of them stay closed, by sentence 2 of the law (decision.py).
 
-STRUCK        after the impact, in the level in which all that touch are open
-STILL, AFTER  the same without a speed too small to be seen, and in the level in which those of CLOSED are closed
+STRUCK        the state after the impact, in the level in which all touching contacts are open
+STILL, AFTER  the same without negligible speeds, and in the level in which the contacts of CLOSED are closed
 """
 
 from __future__ import annotations
@@ -52,57 +52,58 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.events.law.bounces import has_rebounded
 from multiphi_exudyn.events.law.changes import clear
-from multiphi_exudyn.events.law.impact import RESTING, collide, fill_rows, nearest, rub
-from multiphi_exudyn.events.law.impact_round_off import resting_size, speed_size, unseen_speed
+from multiphi_exudyn.events.law.impact import RESTING, add_friction_rows, collide, fill_rows, least_change
+from multiphi_exudyn.events.law.impact_round_off import negligible_speed, resting_size, speed_size
 from multiphi_exudyn.events.law.phases import first_exit, opening, phase_of
-from multiphi_exudyn.events.law.redundancy import join
+from multiphi_exudyn.events.law.redundancy import keep_independent
 from multiphi_exudyn.events.states.maps import find_level, find_map, move
 from multiphi_exudyn.events.states.signals import sign_of
 from multiphi_exudyn.events.states.state_arrays import accelerate, acceleration_sizes, copy_state
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.complementarity.free_rows import ABOVE, BELOW, SIDES, norm
 
-__all__ = ["press", "reaction_sign", "same_speed", "stay_closed"]
+__all__ = ["drop_pulled", "find_pressed", "reaction_sign", "same_speed"]
 
 
 @compiled
-def press(ints: Ints, numbers: Numbers, waves: Waves, count: int) -> int:
-    """2. CLOSED: contacts at rest relative to their stop after an impact whose free motion would close them further.
+def find_pressed(ints: Ints, numbers: Numbers, waves: Waves, count: int) -> int:
+    """2. Set CLOSED: contacts at rest relative to their stop that the free motion would close; return how many.
 
-    Motion is acceleration, or where that presses none of them the first derivative that counts. At rest is also what
-    would be back at its stop, those at rest held, before its gap is more than round-off. How many, NEED or FAILED.
+    The free motion is judged by its acceleration, and if that presses none of them by its first derivative that is not
+    zero. A contact counts as at rest also if it would be back at its stop, with the contacts at rest held, before its
+    gap is more than round-off. NEED or FAILED.
     """
     level, resting, multipliers = ints[STRUCK + LEVEL], ints[RESTING_LIST], ints[FURTHER]
-    strictly = list_resting(ints, numbers, count, 0)
-    status = hold_resting(ints, numbers, strictly)
-    rest = list_resting(ints, numbers, count, 1) if status == OK else 0
-    if rest > strictly:
-        status = hold_resting(ints, numbers, rest)
+    strict_count = list_resting(ints, numbers, count, 0)
+    status = solve_resting_forces(ints, numbers, strict_count)
+    rest_count = list_resting(ints, numbers, count, 1) if status == OK else 0
+    if rest_count > strict_count:
+        status = solve_resting_forces(ints, numbers, rest_count)
     if status < 0:
         return status
     for i in range(ints[ELEMENTS]):
         ints[ints[CLOSED] + i] = 0
     pressed = 0
-    for k in range(rest):
+    for k in range(rest_count):
         if numbers[multipliers + k] > 0.0:
             ints[ints[CLOSED] + ints[resting + k]] = 1
             pressed += 1
     if pressed == 0:
-        for k in range(rest):
+        for k in range(rest_count):
             exit_ = first_exit(ints, level, ints[resting + k])
             if phase_of(ints, numbers, waves, STRUCK, exit_) == REFUSED:
                 ints[ints[CLOSED] + ints[resting + k]] = 1
                 pressed += 1
     for i in range(ints[ELEMENTS]):
         ints[ints[HELD] + i] = 0
-    return join(ints, numbers, ints[CLOSED]) if pressed > 0 else 0
+    return keep_independent(ints, numbers, ints[CLOSED]) if pressed > 0 else 0
 
 
 @compiled
 def list_resting(ints: Ints, numbers: Numbers, count: int, unseen: int) -> int:
-    """2. How many of those that touch are at rest relative to their stop after an impact; which: the resting list.
+    """2. List touching contacts at rest relative to their stop after an impact, and return their number.
 
-    unseen: 1 where at rest is also what the accelerations would turn back before its gap is more than round-off.
+    unseen: 1 to include contacts whose gap the accelerations close again before it is more than round-off.
     """
     level, rest, v = ints[STRUCK + LEVEL], 0, ints[STRUCK + SPEED]
     n = ints[level + MODES] + ints[CHANNELS]
@@ -113,7 +114,7 @@ def list_resting(ints: Ints, numbers: Numbers, count: int, unseen: int) -> int:
             speed += numbers[row + i] * numbers[v + i]
         size = RESTING * (speed_size(ints, numbers, RELEASED, row) + speed_size(ints, numbers, STRUCK, row))
         if unseen == 1 and has_rebounded(ints, numbers, k) == 0:
-            size = max(size, unseen_speed(ints, numbers, STRUCK, ints[ints[TOUCHING] + k], row))
+            size = max(size, negligible_speed(ints, numbers, STRUCK, ints[ints[TOUCHING] + k], row))
         if abs(speed) <= size:
             ints[ints[RESTING_LIST] + rest] = ints[ints[TOUCHING] + k]
             rest += 1
@@ -121,8 +122,8 @@ def list_resting(ints: Ints, numbers: Numbers, count: int, unseen: int) -> int:
 
 
 @compiled
-def hold_resting(ints: Ints, numbers: Numbers, rest: int) -> int:
-    """The accelerations that contacts at rest leave of the free ones, and their forces (rest,); OK, NEED or FAILED."""
+def solve_resting_forces(ints: Ints, numbers: Numbers, rest: int) -> int:
+    """Solve for the forces (rest,) and accelerations of contacts at rest; return OK, NEED or FAILED."""
     level = ints[STRUCK + LEVEL]
     n = ints[level + MODES] + ints[CHANNELS]
     accelerate(ints, numbers, STRUCK, ints[ACCELERATION])
@@ -131,12 +132,12 @@ def hold_resting(ints: Ints, numbers: Numbers, rest: int) -> int:
     acceleration_sizes(ints, numbers, STRUCK, ints[ACCELERATION_TERMS])
     acceleration_sizes(ints, numbers, RELEASED, ints[RELEASED_TERMS])
     fill_rows(ints, numbers, level, ints[RESTING_LIST], rest, 0)
-    rows = rub(ints, numbers, STRUCK, ints[RESTING_LIST], rest, rest, RELEASED)
+    rows = add_friction_rows(ints, numbers, STRUCK, ints[RESTING_LIST], rest, rest, RELEASED)
     for k in range(rows):
         size = resting_size(numbers, ints[ACCELERATION_TERMS], ints[RELEASED_TERMS], ints[ROWS] + k * n, n)
         numbers[ints[RESTING_SIZES] + k] = size
-    sizes, forces = ints[RESTING_SIZES], ints[FURTHER]
-    if nearest(ints, numbers, level, ints[RESTING_LIST], rest, rows, ints[ACCELERATION], sizes, -1, -1, forces) < 0:
+    sizes, forces, resting = ints[RESTING_SIZES], ints[FURTHER], ints[RESTING_LIST]
+    if least_change(ints, numbers, level, resting, rest, rows, ints[ACCELERATION], sizes, -1, -1, forces) < 0:
         return sliding_level(ints, rest)
     for k in range(rest, rows):
         side, leader = ints[ints[ints[SMALL_PROBLEM] + SIDES] + k], ints[ints[LEADERS] + k]
@@ -149,9 +150,9 @@ def hold_resting(ints: Ints, numbers: Numbers, rest: int) -> int:
 
 @compiled
 def sliding_level(ints: Ints, rest: int) -> int:
-    """10. NEED where the level in which contacts slide, whose forces are not determined, has not been tried; or FAILED.
+    """10. Return NEED if the level with sliding contacts, whose forces are indeterminate, is missing; else FAILED.
 
-    Where their motion is not either, it is refused when it is built (levels/sliding.py).
+    If its motion is indeterminate too, it is refused when it is built (levels/sliding.py).
     """
     for i in range(ints[ELEMENTS]):
         ints[ints[KEY] + i] = ints[ints[COMPLIANT_KEY] + i]
@@ -163,12 +164,13 @@ def sliding_level(ints: Ints, rest: int) -> int:
 
 
 @compiled
-def stay_closed(ints: Ints, numbers: Numbers, count: int, same: int) -> int:
-    """2. How many of CLOSED the level in which they are closed would pull, and takes out of it; NEED or FAILED.
+def drop_pulled(ints: Ints, numbers: Numbers, count: int, same: int) -> int:
+    """2. Remove from CLOSED the contacts that would pull in its level; return their number, NEED or FAILED.
 
-    AFTER: the state in that level, the displacement straight from the level before the impact, the velocity from STILL.
+    AFTER becomes the state in that level: its displacement comes from the level before the impact, its velocity from
+    STILL.
     """
-    status = calm(ints, numbers, count)
+    status = remove_negligible_speeds(ints, numbers, count)
     if status < 0:
         return status
     key, closed, pulled = ints[KEY], ints[CLOSED], 0
@@ -195,10 +197,10 @@ def stay_closed(ints: Ints, numbers: Numbers, count: int, same: int) -> int:
 
 
 @compiled
-def calm(ints: Ints, numbers: Numbers, count: int) -> int:
-    """STILL: after an impact, contacts that stay closed lose a speed too small to be seen, and give it to no other.
+def remove_negligible_speeds(ints: Ints, numbers: Numbers, count: int) -> int:
+    """Set STILL: after an impact, contacts that stay closed lose negligible speeds, and give them to no other contact.
 
-    FURTHER: impulses (count,) on those that touch. OK or FAILED.
+    FURTHER holds the impulses (count,) on the touching contacts. OK or FAILED.
     """
     level, touching, held, moving = ints[STRUCK + LEVEL], ints[TOUCHING], 0, 0
     n, v = ints[level + MODES] + ints[CHANNELS], ints[STRUCK + SPEED]
@@ -231,25 +233,26 @@ def calm(ints: Ints, numbers: Numbers, count: int) -> int:
 
 @compiled
 def reaction_sign(ints: Ints, numbers: Numbers, places: int, speeds: int, level: int, contact: int) -> int:
-    """Sign of the reaction a contact would get in a level, zero where it is round-off of the way there; or NEED.
+    """Return the sign of a contact's reaction in a level, zero if it is round-off of the mapped terms; or NEED.
 
-    xi of the state ``places``, xi' of ``speeds``. The same function as the signal after its change alone: a refused
-    contact asks where that one says it may.
+    xi is that of the state ``places``, xi' that of ``speeds``. This is the same function as the signal in the level
+    that a refused contact would enter alone: so the contact requests its change at the root of the function that
+    decides on it.
     """
     row, n = ints[opening(ints, level, contact) + SIGNAL + ROW], ints[level + MODES] + ints[CHANNELS]
-    way, there = find_map(ints, ints[places + LEVEL], level), find_map(ints, ints[speeds + LEVEL], level)
-    if way < 0 or there < 0:
-        return min(way, there)
+    x_map, v_map = find_map(ints, ints[places + LEVEL], level), find_map(ints, ints[speeds + LEVEL], level)
+    if x_map < 0 or v_map < 0:
+        return min(x_map, v_map)
     value, size = numbers[row + 2 * n], abs(numbers[row + 2 * n])
     for i in range(n):
-        term = numbers[row + i] * numbers[ints[way + OFFSET] + i]
+        term = numbers[row + i] * numbers[ints[x_map + OFFSET] + i]
         value += term
         size += abs(term)
     width = ints[ints[places + LEVEL] + MODES] + ints[CHANNELS]
     for j in range(width):
         factor, terms = 0.0, 0.0
         for i in range(n):
-            term = numbers[row + i] * numbers[ints[way + MATRIX] + i * width + j]
+            term = numbers[row + i] * numbers[ints[x_map + MATRIX] + i * width + j]
             factor += term
             terms += abs(term)
         value += factor * numbers[ints[places + PLACE] + j]
@@ -258,8 +261,8 @@ def reaction_sign(ints: Ints, numbers: Numbers, places: int, speeds: int, level:
     for j in range(width):
         damped, reached = 0.0, 0.0
         for i in range(n):
-            damped += numbers[row + n + i] * numbers[ints[there + RATE_MATRIX] + i * width + j]
-            reached += abs(numbers[row + i] * numbers[ints[there + MATRIX] + i * width + j])
+            damped += numbers[row + n + i] * numbers[ints[v_map + RATE_MATRIX] + i * width + j]
+            reached += abs(numbers[row + i] * numbers[ints[v_map + MATRIX] + i * width + j])
         damped *= numbers[ints[speeds + SPEED] + j]
         value += damped
         size += abs(damped) + reached * numbers[ints[speeds + REACH] + j]
@@ -268,7 +271,7 @@ def reaction_sign(ints: Ints, numbers: Numbers, places: int, speeds: int, level:
 
 @compiled
 def same_speed(ints: Ints, numbers: Numbers, before: int, after: int) -> int:
-    """1 where an impact has changed no speed by more than round-off."""
+    """Return 1 if an impact has changed no velocity by more than round-off."""
     r, changed = ints[ints[before + LEVEL] + MODES], 0.0
     for i in range(r):
         difference = numbers[ints[after + SPEED] + i] - numbers[ints[before + SPEED] + i]

@@ -28,10 +28,10 @@ from multiphi_exudyn.events.arrays import (
     WISHES,
     WORKED,
 )
-from multiphi_exudyn.events.law.changes import NOBODY, enter, flag_asking, note, transfer
+from multiphi_exudyn.events.law.changes import NO_REQUEST, enter, flag_requests, record_change, transfer
 from multiphi_exudyn.events.law.impact import collide
 from multiphi_exudyn.events.law.phases import becomes, entered_signal, first_exit, is_denied, update_phases
-from multiphi_exudyn.events.law.redundancy import thin_out
+from multiphi_exudyn.events.law.redundancy import drop_redundant_stick
 from multiphi_exudyn.events.law.resting import same_speed
 from multiphi_exudyn.events.states.signals import row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
@@ -41,58 +41,61 @@ __all__ = ["open_and_enter", "switch"]
 
 
 @compiled
-def switch(ints: Ints, numbers: Numbers, waves: Waves, asking: int) -> int:
-    """4. Compliant contacts change where the level they enter admits it, rigid ones open; OK, NEED or FAILED.
+def switch(ints: Ints, numbers: Numbers, waves: Waves, requests: int) -> int:
+    """4. Let compliant contacts change if the level entered admits it, and rigid ones open; return OK, NEED or FAILED.
 
-    Where it admits none of several together, the first that it admits alone.
+    If the level admits none of several changes together, the first change that is admitted alone is made.
     """
-    c, wishes, singles, at = ints[ELEMENTS], ints[WISHES], ints[SINGLES], -1
+    c, targets, singles, position = ints[ELEMENTS], ints[WISHES], ints[SINGLES], -1
     for i in range(c):
-        ints[wishes + i] = ints[asking + i]
-    thin_out(ints, numbers, wishes)
+        ints[targets + i] = ints[requests + i]
+    drop_redundant_stick(ints, numbers, targets)
     while True:
-        wished = 0
+        target_count = 0
         for i in range(c):
-            wished += 1 if ints[wishes + i] != NOBODY else 0
-        denied = try_wishes(ints, numbers, waves)
+            target_count += 1 if ints[targets + i] != NO_REQUEST else 0
+        denied = try_targets(ints, numbers, waves)
         if denied < 0:
             return denied
         if denied == 0:
             return open_and_enter(ints, numbers, waves)
-        if denied < wished:
+        if denied < target_count:
             for i in range(c):
-                ints[wishes + i] = NOBODY if ints[ints[DENIED] + i] == 1 else ints[wishes + i]
+                ints[targets + i] = NO_REQUEST if ints[ints[DENIED] + i] == 1 else ints[targets + i]
             continue
-        if wished > 1:
+        if target_count > 1:
             for i in range(c):
-                ints[singles + i] = ints[wishes + i]
-            at = 0
-        while 0 <= at < c and ints[singles + at] == NOBODY:
-            at += 1
-        if at < 0 or at >= c:
+                ints[singles + i] = ints[targets + i]
+            position = 0
+        while 0 <= position < c and ints[singles + position] == NO_REQUEST:
+            position += 1
+        if position < 0 or position >= c:
             break
         for i in range(c):
-            ints[wishes + i] = ints[singles + i] if i == at else NOBODY
-        at += 1
-    flag_asking(ints, asking, ints[DENIED])
+            ints[targets + i] = ints[singles + i] if i == position else NO_REQUEST
+        position += 1
+    flag_requests(ints, requests, ints[DENIED])
     update_phases(ints, numbers, waves, WORKED, ints[DENIED])
     return OK
 
 
 @compiled
-def try_wishes(ints: Ints, numbers: Numbers, waves: Waves) -> int:
-    """4. How many of WISHES the level they enter denies, and which: DENIED; or NEED. ENTERED_STATE: the state in it."""
-    states, wishes, key, denied = ints[ints[WORKED + LEVEL] + STATES], ints[WISHES], ints[KEY], 0
+def try_targets(ints: Ints, numbers: Numbers, waves: Waves) -> int:
+    """4. Try the changes to the states in WISHES: return how many the level entered refuses (flags in DENIED), or NEED.
+
+    ENTERED_STATE becomes the state in that level.
+    """
+    states, targets, key, denied = ints[ints[WORKED + LEVEL] + STATES], ints[WISHES], ints[KEY], 0
     for i in range(ints[ELEMENTS]):
-        ints[key + i] = ints[states + i] if ints[wishes + i] == NOBODY else ints[wishes + i]
+        ints[key + i] = ints[states + i] if ints[targets + i] == NO_REQUEST else ints[targets + i]
     status = transfer(ints, numbers, WORKED, key, ENTERED_STATE)
     if status < 0:
         return status
     update_phases(ints, numbers, waves, ENTERED_STATE, -1)
     for i in range(ints[ELEMENTS]):
         ints[ints[DENIED] + i] = 0
-        wished = ints[wishes + i]
-        if wished != NOBODY and is_firm(ints, i, wished) == 0 and is_denied(ints, ENTERED_STATE, i) == 1:
+        target = ints[targets + i]
+        if target != NO_REQUEST and is_unconditional(ints, i, target) == 0 and is_denied(ints, ENTERED_STATE, i) == 1:
             relaxes = is_relaxing(ints, numbers, waves, ENTERED_STATE, i)
             if relaxes < 0:
                 return relaxes
@@ -102,20 +105,20 @@ def try_wishes(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 
 
 @compiled
-def is_firm(ints: Ints, element: int, asked: int) -> int:
-    """3, 8. 1 where an element of WORKED takes its exit into a state whatever that state says."""
+def is_unconditional(ints: Ints, element: int, requested: int) -> int:
+    """3, 8. Return 1 if an element of WORKED takes its exit into a state unconditionally."""
     level = ints[WORKED + LEVEL]
     first = ints[level + FIRST_EXITS] + element
     for k in range(ints[first], ints[first + 1]):
         exit_ = ints[level + EXITS] + k * EXIT_INTS
-        if ints[exit_ + ASKED] == asked and ints[exit_ + FIRMNESS] >= ALWAYS_TAKEN:
+        if ints[exit_ + ASKED] == requested and ints[exit_ + FIRMNESS] >= ALWAYS_TAKEN:
             return 1
     return 0
 
 
 @compiled
 def is_relaxing(ints: Ints, numbers: Numbers, waves: Waves, state: int, element: int) -> int:
-    """7. 1 where a viscous contact is open where closed it would pull; or NEED."""
+    """7. Return 1 if a viscous contact is open and would pull if it were closed; or NEED."""
     level = ints[state + LEVEL]
     if ints[ints[KINDS] + element] != VISCOUS or ints[ints[level + STATES] + element] != OPEN:
         return 0
@@ -131,11 +134,14 @@ def is_relaxing(ints: Ints, numbers: Numbers, waves: Waves, state: int, element:
 
 @compiled
 def open_and_enter(ints: Ints, numbers: Numbers, waves: Waves) -> int:
-    """3. ENTERED_STATE is entered by WISHES: a rigid contact that opens keeps no speed into its stop; OK or FAILED."""
-    wishes, opened, entered = ints[WISHES], 0, ENTERED_STATE
+    """3. Enter ENTERED_STATE with the changes in WISHES; return OK or FAILED.
+
+    A rigid contact that opens loses its velocity towards its stop by an impulse.
+    """
+    targets, opened, entered = ints[WISHES], 0, ENTERED_STATE
     for i in range(ints[ELEMENTS]):
         numbers[ints[PUSHED] + i] = 0.0
-        if ints[wishes + i] == OPEN and ints[ints[KINDS] + i] == RIGID:
+        if ints[targets + i] == OPEN and ints[ints[KINDS] + i] == RIGID:
             ints[ints[TOUCHING] + opened] = i
             opened += 1
     if opened > 0:
@@ -148,7 +154,7 @@ def open_and_enter(ints: Ints, numbers: Numbers, waves: Waves) -> int:
                 numbers[ints[PUSHED] + ints[touching + k]] = numbers[ints[IMPULSES] + k]
         entered = STRUCK
     for i in range(ints[ELEMENTS]):
-        if ints[wishes + i] != NOBODY:
-            note(ints, numbers, i, ints[wishes + i], numbers[ints[PUSHED] + i])
+        if ints[targets + i] != NO_REQUEST:
+            record_change(ints, numbers, i, ints[targets + i], numbers[ints[PUSHED] + i])
     enter(ints, numbers, waves, entered)
     return OK

@@ -1,4 +1,4 @@
-"""The channels of a run, q >= 0, in buffers (arrays.py): their values at an instant, and records of their pieces."""
+"""Channels of a run, q >= 0, in buffers (arrays.py): their values at an instant, and records of their pieces."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 
 __all__ = ["ChannelArrays"]
 
-PIECES_AT_ONCE = 1024  # packed when the loop comes to the end of those it knows
+PIECES_AT_ONCE = 1024  # packed at once, when the loop reaches the end of those packed
 
 
 class ChannelArrays:
-    """The channels of ``levels`` in buffers; terms: the largest number of coefficients of a channel's piece.
+    """Channels of ``levels`` in buffers; terms: the largest number of coefficients of a channel's piece.
 
-    carriers: the same of each carrier by its rate, of the pieces packed so far.
+    carriers: the largest number of coefficients of each carrier, by its rate, in the pieces packed so far.
     """
 
     def __init__(self, levels: LoadedLevels) -> None:
@@ -29,57 +29,63 @@ class ChannelArrays:
         self.carriers: dict[complex, int] = {}
 
     def describe(self, buffers: Buffers) -> None:
-        """How many there are, and memory for their values, in new buffers."""
+        """Write the number of channels and reserve memory for their values, in new buffers."""
         q, ints = self._excitation.prescribed, buffers.ints
         ints[a.CHANNELS], ints[a.PRESCRIBED] = self._excitation.channels, q
-        given = {a.DRIVE: buffers.take("numbers", 6 * q), a.SCALED_TERM: buffers.take("waves", self.terms * q)}
+        slots = {a.DRIVE: buffers.take("numbers", 6 * q), a.SCALED_TERM: buffers.take("waves", self.terms * q)}
         for slot in (a.DRIVE_WAVES, a.DRIVE_NEXT):
-            given[slot] = buffers.take("waves", q * self.terms * q)
-        for slot, value in given.items():
+            slots[slot] = buffers.take("waves", q * self.terms * q)
+        for slot, value in slots.items():
             ints[slot] = value
         self.reserve(buffers)
 
     def reserve(self, buffers: Buffers) -> None:
-        """Records of the pieces that follow."""
+        """Pack the next pieces."""
         if not self._excitation.prescribed:
             return
-        put, first, all_ = buffers.put, int(buffers.ints[a.PIECE_COUNT]), self._pieces
+        put, first, pieces = buffers.put, int(buffers.ints[a.PIECE_COUNT]), self._pieces
         if first == 0:
-            table = buffers.take("ints", len(all_))
+            table = buffers.take("ints", len(pieces))
             buffers.ints[a.PIECES] = table
-        last = min(first + PIECES_AT_ONCE, len(all_))
-        times = put("numbers", np.column_stack([all_.starts, all_.ends])[first:last])
-        for places, terms in all_.terms(first, last):
-            for rates, given in terms:
+        last = min(first + PIECES_AT_ONCE, len(pieces))
+        times = put("numbers", np.column_stack([pieces.starts, pieces.ends])[first:last])
+        for places, terms in pieces.terms(first, last):
+            for rates, coefficients in terms:
                 for rate in np.unique(rates).tolist():
-                    self.carriers[rate] = max(self.carriers.get(rate, 0), given.shape[1])
-            k, parts = len(places), [np.column_stack([rates, given.reshape(len(given), -1)]) for rates, given in terms]
+                    self.carriers[rate] = max(self.carriers.get(rate, 0), coefficients.shape[1])
+            k, parts = (
+                len(places),
+                [
+                    np.column_stack([rates, coefficients.reshape(len(coefficients), -1)])
+                    for rates, coefficients in terms
+                ],
+            )
             waves = np.hstack(parts)
             starts = np.cumsum([0, *(part.shape[1] for part in parts)])[:-1] + np.arange(k)[:, None] * waves.shape[1]
             records = np.empty((k, a.TERM_INTS + 2 * len(terms)), np.int64)
             records[:, a.PIECE_TIMES], records[:, a.PIECE_TERMS] = times + 2 * (places - first), len(terms)
-            records[:, a.TERM_INTS :: 2] = [given.shape[1] for _, given in terms]
+            records[:, a.TERM_INTS :: 2] = [coefficients.shape[1] for _, coefficients in terms]
             records[:, a.TERM_INTS + 1 :: 2] = put("waves", waves) + starts
-            at = put("ints", records) + np.arange(k) * records.shape[1]
-            buffers.ints[buffers.ints[a.PIECES] + places] = at
+            record_starts = put("ints", records) + np.arange(k) * records.shape[1]
+            buffers.ints[buffers.ints[a.PIECES] + places] = record_starts
         buffers.ints[a.PIECE_COUNT] = last
 
     def reserve_until(self, buffers: Buffers, piece: int) -> None:
-        """Records of the pieces up to one."""
+        """Pack the pieces up to one."""
         while self._excitation.prescribed and buffers.ints[a.PIECE_COUNT] <= piece:
             self.reserve(buffers)
 
     @property
     def first_end(self) -> float:
-        """When [s] the first piece of the channels ends, as far as it is asked for."""
+        """End [s] of the first piece of the channels, or of the motion."""
         return min(self._until, float(self._pieces.ends[0])) if self._excitation.prescribed else self._until
 
     def drive(self, piece: int) -> Drive:
-        """The channels from the beginning of a piece on."""
+        """Return the channels from the start of a piece on."""
         return self._excitation.drive(float(self._pieces.starts[piece]))
 
     def at(self, buffers: Buffers, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Set the channels to a time [s]: w, w' (q,) there of those that are functions of time."""
+        """Set the channels to a time [s], and return w, w' (q,) of those that are functions of time."""
         if not self._excitation.prescribed:
             self.set(buffers, 0, time - float(self._pieces.starts[0]), time)
             return np.zeros(0), np.zeros(0)
@@ -89,7 +95,7 @@ class ChannelArrays:
         return buffers.numbers[place : place + q].copy(), buffers.numbers[place + q : place + 2 * q].copy()
 
     def set(self, buffers: Buffers, piece: int, age: float, time: float) -> None:
-        """The channels a time ``age`` [s] after the beginning of a piece, for the scales of the first state."""
+        """Set the channels to a time ``age`` [s] after the start of a piece, for the scales of the first state."""
         ints, numbers = buffers.ints, buffers.numbers
         ints[a.PIECE], numbers[a.AGE], numbers[a.HORIZON] = piece, age, 1.0
         if not self._excitation.prescribed:

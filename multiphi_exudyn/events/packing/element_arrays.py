@@ -1,4 +1,4 @@
-"""The run record, and what is known of the elements of a model, in new buffers (arrays.py)."""
+"""Run record and data of the elements of a model, in new buffers (arrays.py)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["describe_elements"]
 
 
 def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
-    """Kinds, stiffnesses, directions and springs of all elements, behind the run record."""
+    """Write kinds, stiffnesses, directions and springs of all elements, behind the run record."""
     put = buffers.put
     buffers.take("ints", a.RUN_INTS)
     buffers.take("numbers", a.RUN_NUMBERS)
@@ -30,16 +30,16 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
     for i, law in base.laws.items():
         if law.further:
             segments[i] = base.link_indices[i][1], *law.knot_counts
-    limits, rubs = np.zeros((2, c)), np.zeros((2, c))
+    limits, rough = np.zeros((2, c)), np.zeros((2, c))
     for i, element in enumerate(model.contacts):
         if isinstance(element, Friction) and element.rigid:
             limits[:, i] = element.limit, element.most
         if isinstance(element, UnilateralContact):
-            table = rubs if element.rigid else limits if math.isinf(element.tangential_stiffness) else np.zeros((2, c))
+            table = rough if element.rigid else limits if math.isinf(element.tangential_stiffness) else np.zeros((2, c))
             table[:, i] = element.friction, element.most
     lengths = np.linalg.norm(base.directions, axis=0)
     units = base.directions / np.where(lengths > 0, lengths, 1.0)
-    given = {
+    slots = {
         a.ELEMENTS: c,
         a.COORDINATES: base.modes.count,
         a.WHOLE: int(model.whole),
@@ -52,23 +52,23 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
         a.DIRECTIONS: put("numbers", units.T),
         a.LIMITS: put("numbers", limits[0]),
         a.STATIC_LIMITS: put("numbers", limits[1]),
-        a.FRICTIONS: put("numbers", rubs[0]),
-        a.STATIC_FRICTIONS: put("numbers", rubs[1]),
+        a.FRICTIONS: put("numbers", rough[0]),
+        a.STATIC_FRICTIONS: put("numbers", rough[1]),
         a.RESTITUTIONS: put("numbers", [getattr(element, "restitution", 0.0) for element in model.contacts]),
         **_frictions(buffers, model),
     }
-    for slot, value in given.items():
+    for slot, value in slots.items():
         buffers.ints[slot] = value
     buffers.numbers[a.INDEPENDENCE] = INDEPENDENT
 
 
 def _frictions(buffers: Buffers, model: MultiPhiModel) -> dict[int, int]:
-    """What the elements with a held link do with its spring."""
-    found = np.array([friction_spring(element) for element in model.contacts]).reshape(-1, 4)
-    places = [links[int(row[1])] for links, row in zip(model.link_indices, found, strict=True)]
+    """Write the tangential springs of the elements with a held link."""
+    springs = np.array([friction_spring(element) for element in model.contacts]).reshape(-1, 4)
+    places = [links[int(row[1])] for links, row in zip(model.link_indices, springs, strict=True)]
     return {
-        a.STICKS: buffers.put("ints", found[:, 0]),
+        a.STICKS: buffers.put("ints", springs[:, 0]),
         a.HELD_LINKS: buffers.put("ints", places),
-        a.SPRINGS: buffers.put("numbers", found[:, 2]),
-        a.DROPS: buffers.put("numbers", found[:, 3]),
+        a.SPRINGS: buffers.put("numbers", springs[:, 2]),
+        a.DROPS: buffers.put("numbers", springs[:, 3]),
     }

@@ -1,4 +1,4 @@
-"""Levels, maps and signals of one model under its loads as arrays (arrays.py), packed when the loop asks for them."""
+"""Levels, maps and signals of one model under its loads as arrays (arrays.py), packed when the loop needs them."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ from multiphi_exudyn.events.transitions.transition import Transition
 __all__ = ["LevelArrays"]
 
 ARRAY_BYTES = 2**29  # of a model's arrays under all loads: half of what a model may keep (level_store.py)
-FEWEST_LEVELS = 8  # packed whatever they take: a run that goes to and fro between a few would pack them at every event
-UNTOUCHED = np.zeros(0)  # a ring to which nothing has been written
-ROOM = 1024  # segments, and events, that the loop records before they are taken, in a long run
+FEWEST_LEVELS = 8  # are kept whatever their size: a run that alternates between a few would pack them at every event
+EMPTY_RING = np.zeros(0)  # of a run without decisions
+ROOM = 1024  # segments, and events, that the loop records before the run copies them
 
 
-class Held(Protocol):
-    """What acts on a structure for a while, and changes the arrays of its levels."""
+class LevelChanges(Protocol):
+    """Temporary action on a structure that changes the arrays of its levels."""
 
     def change_level(self, level: int) -> None:
-        """Change a level that stands in the ints, before it is used for the first time since then."""
+        """Change a packed level, before its first use under this action."""
 
     def change_map(self, source: int, target: int, record: int) -> None:
         """Change the map between two levels."""
@@ -51,58 +51,58 @@ class Held(Protocol):
 
 
 class LevelArrays:
-    """What the loop knows of ``levels``; ``loaded``: the levels themselves, by their number.
+    """Arrays of ``levels`` for the loop; ``loaded``: the levels that are packed, by their number.
 
-    owner: the run whose state stands in the arrays. room: for segments, and events, in a record.
-    held: what changes levels and maps before they are used.
+    owner: the run whose state is in the arrays. room: number of segments, and of events, in a record. held: the action
+    that changes levels and maps before they are used.
     """
 
     def __init__(self, levels: LoadedLevels) -> None:
         self.levels = levels
         self.owner: Callable[[], Any] | None = None
-        self.held: Held | None = None
+        self.held: LevelChanges | None = None
         self.room = ROOM
         self._count = 0  # of levels packed so far
         self._exits = ExitTable(levels.model.contacts)
         self._memory = np.empty(0, complex)
-        self._weighed: int = 0  # size of the buffers when others were last looked at
+        self._checked_size: int = 0  # of the buffers, when memory was last checked
         self.channels = ChannelArrays(levels)
         self.forget()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.levels,)  # what is unpickled begins anew
+        return type(self), (self.levels,)  # a copy starts without levels
 
     def lent(self, piece: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The buffers, for questions between two advances of a run, which then puts its state there again.
+        """Return the buffers for evaluations between two advances of a run, which then writes its state again.
 
-        piece: the last one of the channels that they are about.
+        piece: the last piece of the channels that they need.
         """
         self.channels.reserve_until(self.buffers, piece)
-        self._weigh()
+        self._check_size()
         self.owner = None
         return self.buffers.all
 
     def memory(self, count: int) -> np.ndarray:
-        """Waves (count, or more) for questions, the same ones each time."""
+        """Return an array of waves (count, or more) for evaluations, the same one each time."""
         if len(self._memory) < count:
             self._memory = np.empty(count, complex)
         return self._memory
 
     @property
     def full(self) -> bool:
-        """Whether the arrays are too large; those that their model keeps beside them go first."""
-        self._weigh()
-        return self._weighed > ARRAY_BYTES and len(self.loaded) > FEWEST_LEVELS
+        """Whether the arrays are too large; other arrays that the model keeps are dropped first."""
+        self._check_size()
+        return self._checked_size > ARRAY_BYTES and len(self.loaded) > FEWEST_LEVELS
 
-    def _weigh(self) -> None:
-        """Look at what others take where the arrays have grown, for levels or for questions."""
-        if self.buffers.size != self._weighed:
-            self._let_others_go()
+    def _check_size(self) -> None:
+        """Drop others' arrays if these have grown and memory is short."""
+        if self.buffers.size != self._checked_size:
+            self._evict_others()
 
-    def _let_others_go(self) -> None:
-        """Of all that a model keeps the least recently used goes, until there is room."""
-        self._weighed = self.buffers.size
-        loaded = dict.fromkeys(levels for _, levels in self.levels.model.loaded.items())  # some by two keys
+    def _evict_others(self) -> None:
+        """Drop the least recently used arrays that the model keeps, until there is room."""
+        self._checked_size = self.buffers.size
+        loaded = dict.fromkeys(levels for _, levels in self.levels.model.loaded.items())  # some are kept by two keys
         others = [(levels, arrays) for levels in loaded for arrays in levels.kept_arrays if arrays is not self]
         total = self.buffers.size + sum(arrays.buffers.size for _, arrays in others)
         for levels, arrays in others:
@@ -112,20 +112,20 @@ class LevelArrays:
             levels.let_go(arrays)
 
     def forget(self) -> None:
-        """Begin anew, without any level."""
+        """Start again without any level."""
         self.buffers = Buffers()
-        self._weighed = 0
+        self._checked_size = 0
         self.loaded: dict[int, LoadedLevel] = {}
-        self._offsets: dict[int, int] = {}  # of levels in the ints, by number
+        self._offsets: dict[int, int] = {}  # records of levels, by number
         self._levels: dict[tuple[int, ...], int] = {}  # numbers by key
         self._maps: dict[tuple[int, int], int] = {}  # records by their levels
-        self._ring = 0  # where that of a chatter check begins
+        self._ring = 0  # offset of the ring of the chatter check
         self._recorded = 0, 0  # coordinates and exits for which the record has room
-        self.base = 0  # where it stands as a level in the ints, once there are starts
-        self._starts = 0  # for how many there is room
+        self.base = 0  # its record as a level, once there are starts
+        self._starts = 0  # number of starts for which there is memory
         describe_elements(self.buffers, self.levels.model)
         self.ints[a.ISOLATED] = self.levels.isolated
-        self._tables = LevelTables(self.buffers)  # what the loop finds, and does not ask for
+        self._tables = LevelTables(self.buffers)  # of all levels and maps that the loop finds
         self.channels.describe(self.buffers)
         self.scratch = ScratchArrays(self.buffers, self.channels.terms)
 
@@ -140,7 +140,7 @@ class LevelArrays:
         return self.buffers.numbers
 
     def set_chatter(self, window: int, decisions: int, ring: np.ndarray) -> None:
-        """The chatter check of a run: the size of its window, the decisions so far, and its ring as it stands."""
+        """Set the chatter check of a run: the size of its window, the decisions so far, and its ring."""
         ints = self.buffers.ints
         if not self._ring:
             self._ring = ints[a.RING] = self.buffers.take("numbers", 2 * (window + 1))
@@ -150,24 +150,24 @@ class LevelArrays:
 
     @property
     def chatter(self) -> tuple[int, np.ndarray]:
-        """The decisions so far, and what stands in the ring."""
+        """The decisions so far, and the contents of the ring."""
         decisions = int(self.buffers.ints[a.DECISIONS])
         if not decisions:
-            return 0, UNTOUCHED
+            return 0, EMPTY_RING
         count = 2 * min(decisions, int(self.buffers.ints[a.WINDOW]) + 1)
         return decisions, self.buffers.numbers[self._ring : self._ring + count].copy()
 
     @property
     def outgrown(self) -> bool:
-        """Whether a level has come that is larger than the record has room for."""
+        """Whether a level has been packed that is larger than the record allows."""
         return self._recorded[0] < self.scratch.coordinates or self._recorded[1] < self.scratch.exits
 
     def begin_record(self) -> None:
-        """An empty record to write to."""
+        """Begin an empty record."""
         if self.outgrown:
             n, exits = self._recorded = self.scratch.coordinates, self.scratch.exits
             room, events = self.room, max(self.room, self.scratch.changes)
-            wanted = {
+            sizes_by_buffer = {
                 "ints": {
                     a.SEGMENT_INTS: a.SEGMENT_WIDTH * room,
                     a.PHASE_INTS: exits * room,
@@ -182,19 +182,19 @@ class LevelArrays:
                     a.IMPACT_NUMBERS: a.IMPACT_WIDTH * events,
                 },
             }
-            for name, sizes in wanted.items():
-                place = self.buffers.take(name, sum(sizes.values()))  # at once: a buffer that grows is copied
+            for name, sizes in sizes_by_buffer.items():
+                place = self.buffers.take(name, sum(sizes.values()))  # in one step: a buffer that grows is copied
                 for slot, count in sizes.items():
                     self.ints[slot] = place
                     place += count
             self.ints[a.SEGMENT_ROOM], self.ints[a.EVENT_ROOM] = room, events
-            self._let_others_go()
+            self._evict_others()
         ints = self.buffers.ints
         ints[a.SEGMENT_COUNT] = ints[a.COORDINATE_COUNT] = ints[a.PHASE_COUNT] = ints[a.EVENT_COUNT] = 0
         ints[a.LEFT_OUT_COUNT] = ints[a.IMPACT_COUNT] = 0
 
     def level(self, states: Sequence[int]) -> int:
-        """Where the level of elements in these states stands in the ints, packed if it was not."""
+        """Return the record of the level of elements in these states, packing it if needed."""
         key = tuple(states)
         if key not in self._levels:
             self._add(self.levels.level(key))
@@ -206,7 +206,7 @@ class LevelArrays:
         return record
 
     def hide(self) -> None:
-        """Let the loop ask once more for every level and map, which are changed before they are used again."""
+        """Empty the tables, so that every level and map is changed before it is used again."""
         self._tables.clear()
 
     def supply(self) -> None:
@@ -229,11 +229,11 @@ class LevelArrays:
             self._supply_room()
 
     def _supply_room(self) -> None:
-        """Room for the powers that a response to a term has taken."""
+        """Enlarge the memory to the powers of time that a response to a term has."""
         self.scratch.reserve_powers(max(len(level.response.basis.rates) for level in self.loaded.values()))
 
     def reserve_starts(self, count: int) -> None:
-        """Room for so many starts, and the base in which they are; where there was less, none stands there any more."""
+        """Reserve memory for so many starts, and pack the base; if it must grow, earlier starts are lost."""
         if not self.base:
             self._add_base()
         if count > self._starts:
@@ -243,7 +243,7 @@ class LevelArrays:
             self.ints[a.START_STATES] = self.buffers.take("ints", count * int(self.ints[a.ELEMENTS]))
 
     def _add_base(self) -> None:
-        """Pack the base as a level, with memory for what happens there."""
+        """Pack the base as a level, with memory for the states in it."""
         base, n = self.levels.model.base, int(self.ints[a.COORDINATES] + self.ints[a.CHANNELS])
         for state in (a.GIVEN, a.SLOWED):
             self.scratch.reserve_state(state, n, int(self.ints[a.ELEMENTS]))
@@ -260,25 +260,25 @@ class LevelArrays:
         self._count += 1
 
     def add_powers(self, level: int) -> None:
-        """Pack the power of damping, of what varies and of friction in a level that stands in the ints."""
+        """Pack the powers of damping, of varying loads and of friction in a level that is packed."""
         if not self.ints[level + a.DISSIPATION]:
             put_powers(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])], self.channels.carriers)
 
     def add_strain(self, states: tuple[int, ...]) -> None:
-        """Pack the strain energy of a level, if it stands in the ints, for runs that end in it."""
+        """Pack the strain energy of a level, if the level is packed, for runs that end in it."""
         record = self._offsets[self._levels[states]] if states in self._levels else 0
         if record and not self.ints[record + a.STRAIN_FORM]:
             put_strain(self.buffers, record, self.loaded[self._levels[states]])
 
     def _add_sizes(self, level: int) -> None:
-        """Pack what |y| and the work of static loads are read from in a level that stands in the ints."""
+        """Pack the factors of |y| and of the work of static loads in a level that is packed."""
         put_sizes(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])])
 
     def _add_entered(self, source: int, exit_number: int) -> None:
-        """The signal that an exit's element would have in the level entered alone."""
+        """Pack the signal that an exit's element would have in the level entered alone."""
         level = self.loaded[int(self.ints[source + a.NUMBER])]
         element, exit_ = exits_of(level)[exit_number]
-        entered = self.level(after(level, element, asked_alone(exit_)))  # may make the buffers anew
+        entered = self.level(after(level, element, asked_alone(exit_)))  # may replace the buffers
         target = self.loaded[int(self.ints[entered + a.NUMBER])]
         row = entered_row(self.levels.transition(level, target), element)
         signal = self.buffers.put("ints", put_signal(self.buffers.put, level, row))
@@ -296,24 +296,26 @@ class LevelArrays:
         self._tables.add_map(source, target, record)
 
     def _map(self, source: int, target: int) -> int:
-        """The record of the map between two levels."""
+        """Pack the map between two levels and return its record."""
         put, level = self.buffers.put, self.loaded[int(self.ints[target + a.NUMBER])]
-        sizes, terms, way = np.zeros(0), None, None
+        sizes, terms, transition = np.zeros(0), None, None
         if source == self.base:
             matrix, offset, rate_matrix, sizes = from_base(level)
         else:
-            way = self.levels.transition(self.loaded[int(self.ints[source + a.NUMBER])], level)
-            matrix, offset, rate_matrix, terms = way.matrix, way.offset, way.velocity_matrix, way.terms
-        at = put("numbers", matrix)
-        rates = at if rate_matrix is matrix or np.array_equal(rate_matrix, matrix) else put("numbers", rate_matrix)
-        known = -1 if terms is None else put("numbers", terms)
-        defect = self._defect(way, level) if self.ints[a.JUDGED] else -1
-        return put("ints", [at, put("numbers", offset), rates, -1, put("numbers", sizes), known, defect])
+            transition = self.levels.transition(self.loaded[int(self.ints[source + a.NUMBER])], level)
+            matrix, offset, rate_matrix = transition.matrix, transition.offset, transition.velocity_matrix
+            terms = transition.terms
+        matrix_at = put("numbers", matrix)
+        same = rate_matrix is matrix or np.array_equal(rate_matrix, matrix)
+        rate_at = matrix_at if same else put("numbers", rate_matrix)
+        terms_at = -1 if terms is None else put("numbers", terms)
+        defect = self._defect(transition, level) if self.ints[a.JUDGED] else -1
+        return put("ints", [matrix_at, put("numbers", offset), rate_at, -1, put("numbers", sizes), terms_at, defect])
 
-    def _defect(self, way: Transition | None, level: LoadedLevel) -> int:
-        """Where stands what a defect is read from on the way from a level, or from the base, into a level, or -1."""
-        if way is None:
+    def _defect(self, transition: Transition | None, level: LoadedLevel) -> int:
+        """Pack the form of the defect of a transition, None for one from the base, and return its start, or -1."""
+        if transition is None:
             form = start_form(level)
             return -1 if form is None else self.buffers.put("numbers", form)
-        parts = defect_form(way, ())
+        parts = defect_form(transition, ())
         return self.buffers.put("numbers", np.concatenate([parts.displaced, parts.moving], axis=None))

@@ -1,6 +1,6 @@
-"""What describes a level's motion, gaps, energies and powers, and those of the base, as arrays (arrays.py).
+"""Matrices of a level's motion, gaps, energies and powers, and those of the base, as arrays (arrays.py).
 
-All of it is in the coordinates xi = (eta, w) of a loaded level, with q >= 0 channels.
+All are in the coordinates xi = (eta, w) of a loaded level, with q >= 0 channels.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ __all__ = ["base_parts", "from_base", "level_parts", "powers"]
 
 
 def level_parts(level: LoadedLevel) -> dict[int, np.ndarray]:
-    """Motion, gaps and energies of a level."""
+    """Return motion, gaps and energies of a level."""
     own, modal, channels, form = level.level, level.modal, level.channels, level.potential_form
     stiffness, drive = -modal.coupling, level.asymptotic.drive[:, None]
     stiffness.flat[:: modal.modes + 1] -= modal.squares
@@ -38,7 +38,7 @@ def level_parts(level: LoadedLevel) -> dict[int, np.ndarray]:
 
 
 def base_parts(base: ModalBase, excitation: Excitation) -> dict[int, np.ndarray]:
-    """Gaps and energies of the base, all contacts open, in (y, w)."""
+    """Return gaps and energies of the base, all contacts open, in (y, w)."""
     q, patterns = excitation.channels, excitation.patterns.T
     rows = np.column_stack([patterns, np.zeros((q, q))])
     linear = [-base.preload - excitation.static, np.zeros(q)]
@@ -50,7 +50,10 @@ def base_parts(base: ModalBase, excitation: Excitation) -> dict[int, np.ndarray]
 
 
 def from_base(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The map (T, c, T') from the base to a level; sizes (r, q + 1) of the terms that channels and rest give a mode."""
+    """Return the map (T, c, T') from the base to a level, and the sizes of its terms.
+
+    The sizes (r, q + 1) are those of the terms that the channels and the equilibrium give a mode.
+    """
     vectors, channels, rest = level.modal.vectors.T, level.channels, level.asymptotic.configuration
     (r, m), q = vectors.shape, channels.carried.shape[1]
     place, speed = np.eye(r + q, m + q, m - r), np.eye(r + q, m + q, m - r)
@@ -61,10 +64,11 @@ def from_base(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, n
 
 
 def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The power of damping as a form in xi' (n, n), of what varies (q, 4 n + 1), of friction (n,), as in work.py.
+    """Return the powers in a level, as in work.py: of damping, of varying loads, of constant and of other friction.
 
-    And of friction that goes with other forces (s, 4 n + 1): T, the speed on which it works, that of its constant part,
-    and this. Without channels only the first and the third are not empty.
+    Damping: a form in xi' (n, n). Varying loads: (q, 4 n + 1). Constant friction: (n,). Friction due to the forces of
+    links (s, 4 n + 1): T, the velocity on which it works, that on which its constant part works, and this part. Without
+    channels only the first and the third are not empty.
     """
     own, base, index, carried = level.level, level.level.base, list(level.level.indices), level.channels.carried
     modal, patterns = level.modal, level.excitation.patterns
@@ -77,27 +81,27 @@ def powers(level: LoadedLevel) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
     springs = base.springs[index]
     pulls, drags = springs[:, None] * own.gap_rows[index], base.dampings[index][:, None] * own.speed_rows[index]
     held = springs * level.gap_constants[index]
-    given = carried.T @ base.pushes - level.excitation.stops.T  # by the forces of elements
-    worked = given[:, index]
-    placed = worked @ pulls + carried.T @ (base.modes.omega[:, None] ** 2 * own.vectors)
-    placed[:, modal.modes :] -= carried.T @ patterns
-    speed = worked @ drags + carried.T @ base.damping @ moved
-    constant = worked @ held + carried.T @ (base.modes.omega**2 * level.asymptotic.configuration - static)
-    constant -= given @ level.pushes
+    stop_columns = carried.T @ base.pushes - level.excitation.stops.T  # work of unit forces of links on w'
+    link_columns = stop_columns[:, index]
+    on_displacement = link_columns @ pulls + carried.T @ (base.modes.omega[:, None] ** 2 * own.vectors)
+    on_displacement[:, modal.modes :] -= carried.T @ patterns
+    on_velocity = link_columns @ drags + carried.T @ base.damping @ moved
+    constant = link_columns @ held + carried.T @ (base.modes.omega**2 * level.asymptotic.configuration - static)
+    constant -= stop_columns @ level.pushes
     slides = [k for k, link in enumerate(index) if link in base.oblique and np.isinf(base.stiffnesses[link])]
-    placed -= worked[:, slides] @ own.force_rows[slides]
-    speed -= worked[:, slides] @ own.force_rate_rows[slides]
-    constant -= worked[:, slides] @ level.asymptotic.forces[slides]
+    on_displacement -= link_columns[:, slides] @ own.force_rows[slides]
+    on_velocity -= link_columns[:, slides] @ own.force_rate_rows[slides]
+    constant -= link_columns[:, slides] @ level.asymptotic.forces[slides]
     pairs = []
     for i in level.rubbing_elements:
         held = next(k for k in base.link_indices[i] if base.links[k].held)
         (place, rate, still), moves = level.rubbing(i), level.excitation.stops[held]
         pairs.append(np.concatenate([place, rate, own.speed_rows[held], own.gap_rows[held], [still]]))
-        placed -= np.outer(moves, place)
-        speed -= np.outer(moves, rate)
+        on_displacement -= np.outer(moves, place)
+        on_velocity -= np.outer(moves, rate)
         constant -= still * moves
     damping = moved.T @ base.damping @ moved + own.speed_rows[index].T @ drags
-    damping[: modal.modes, : modal.modes] = modal.damping  # given ratios count
-    varying = np.column_stack([patterns.T @ own.vectors, placed, speed, carried.T @ moved, constant])
+    damping[: modal.modes, : modal.modes] = modal.damping  # with the damping ratios given
+    varying = np.column_stack([patterns.T @ own.vectors, on_displacement, on_velocity, carried.T @ moved, constant])
     rubbing = np.array(pairs).reshape(-1, 4 * own.modes + 1)
     return damping, varying, friction, rubbing

@@ -32,27 +32,27 @@ describe = entry(describe_basis)
 
 
 def put_base(buffers: Buffers, base: ModalBase, excitation: Excitation) -> int:
-    """The record of the base as a level in which all contacts are open, where runs start."""
+    """Write the record of the base as a level in which all contacts are open and runs start, and return it."""
     elements, parts = int(buffers.ints[a.ELEMENTS]), base_parts(base, excitation)
     batch = Batch(buffers)
-    given = {
+    slots = {
         a.MODES: base.modes.count,
         a.STATES: batch.put("ints", np.zeros(elements, int)),
         **_frequencies(batch, base.modes.omega),
         **{slot: batch.put("numbers", values) for slot, values in parts.items()},
     }
-    record = _record(batch, given)
+    record = _record(batch, slots)
     batch.write()
     return record
 
 
 def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTable, kept: np.ndarray) -> int:
-    """The record of a level with a number, and of its exits, those of the table that are kept (e,)."""
+    """Write the record of a level with a number, and of its exits, those of the table that are kept (e,)."""
     own, modal, parts = level.level, level.modal, level_parts(level)
     batch, firsts = Batch(buffers), exits.firsts(kept)
     put = batch.put
     basis = _put_basis(batch, level.response.basis)
-    given = {
+    slots = {
         a.NUMBER: number,
         a.MODES: modal.modes,
         a.STATES: put("ints", level.states),
@@ -68,17 +68,17 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
         a.FOLLOW_COUNT: len(parts[a.FOLLOWS]),
         **{slot: put("numbers", values) for slot, values in parts.items()},
     }
-    record = _record(batch, given)
+    record = _record(batch, slots)
     batch.write()
     describe(*buffers.all, basis)
     return record
 
 
 def put_powers(buffers: Buffers, record: int, level: LoadedLevel, carriers: Mapping[complex, int]) -> None:
-    """Give the record of a level the power of damping, of what varies and of friction, and their primitives."""
+    """Add the powers of damping, of varying loads and of friction, and their primitives, to the record of a level."""
     damping, varying, rubbing, pairs = powers(level)
     damping, friction = (damping + damping.T) / 2, np.concatenate([rubbing, pairs], axis=None)
-    given = {
+    slots = {
         a.DISSIPATION: buffers.put("numbers", damping),
         a.POWER: buffers.put("numbers", varying),
         a.RUBBING: buffers.put("numbers", friction) if friction.any() else -1,
@@ -87,14 +87,14 @@ def put_powers(buffers: Buffers, record: int, level: LoadedLevel, carriers: Mapp
         a.SWINGS: buffers.put("waves", swings(level, varying)) if level.excitation.channels else -1,
         a.DRIVEN: -1,
     }
-    if given[a.DISSIPATED] >= 0 and (forms := driven_forms(level, damping, varying, carriers)) is not None:
-        given[a.DRIVEN] = _put_driven(buffers, forms)
-    for slot, value in given.items():
+    if slots[a.DISSIPATED] >= 0 and (forms := driven_forms(level, damping, varying, carriers)) is not None:
+        slots[a.DRIVEN] = _put_driven(buffers, forms)
+    for slot, value in slots.items():
         buffers.ints[record + slot] = value
 
 
 def _put_dissipated(buffers: Buffers, form: np.ndarray | None) -> dict[int, int]:
-    """Where the form (2 r, 2 r) of what damping takes stands, and which modes go with each other in it."""
+    """Write the form (2 r, 2 r) of the work of damping, and the range of modes that are coupled in it."""
     if form is None:
         return {a.DISSIPATED: -1}
     r = len(form) // 2
@@ -103,7 +103,7 @@ def _put_dissipated(buffers: Buffers, form: np.ndarray | None) -> dict[int, int]
 
 
 def _put_driven(buffers: Buffers, forms: DrivenForms) -> int:
-    """The record of the forms of what channels force."""
+    """Write the record of the forms of forced responses."""
     arrays = (forms.response, *forms.changing, *forms.lasting, forms.nodes, forms.weights)
     places = [buffers.put("numbers", array) for array in arrays]
     rates = buffers.put("waves", list(forms.carriers))
@@ -114,17 +114,17 @@ def _put_driven(buffers: Buffers, forms: DrivenForms) -> int:
 
 
 def put_sizes(buffers: Buffers, record: int, level: LoadedLevel) -> None:
-    """Give the record of a level what |y| and the work of static loads on y are read from."""
+    """Add the factors of |y| and of the work of static loads on y to the record of a level."""
     motion = np.column_stack([level.level.vectors, level.asymptotic.configuration])
     n = motion.shape[1]
-    given = np.zeros((n + 1, n))
-    given[-1] = level.excitation.static @ motion
-    given[:-1] = factor(motion)
-    buffers.ints[record + a.SIZES] = buffers.put("numbers", given)
+    factors = np.zeros((n + 1, n))
+    factors[-1] = level.excitation.static @ motion
+    factors[:-1] = factor(motion)
+    buffers.ints[record + a.SIZES] = buffers.put("numbers", factors)
 
 
 def put_strain(buffers: Buffers, record: int, level: LoadedLevel) -> None:
-    """Give the record of a level its strain energy."""
+    """Add the strain energy to the record of a level."""
     form = level.strain_form
     rows = np.column_stack([form.weights, form.rows, form.offsets])
     buffers.ints[record + a.STRAIN_ROWS] = len(rows)
@@ -133,13 +133,13 @@ def put_strain(buffers: Buffers, record: int, level: LoadedLevel) -> None:
 
 
 def put_signal(put: Put, level: LoadedLevel, row: Row) -> list[int]:
-    """The record of a signal."""
+    """Write a signal, and return its record."""
     table = np.concatenate([row.position, row.rate, [row.constant]])[None, :]
     return [int(part) for part in _put_signals(put, level, table)[0]]
 
 
 def _put_signals(put: Put, level: LoadedLevel, table: np.ndarray) -> np.ndarray:
-    """The records (e, 3) of signals (exits.signals_of)."""
+    """Write signals, and return their records (e, 3) (exits.signals_of)."""
     n, r, shapes = level.width, level.modal.modes, level.response.shapes
     waves, moves, records = table[:, :r] @ shapes, table[:, n:-1].any(axis=1), np.empty((len(table), 3), int)
     if moves.any():
@@ -151,22 +151,22 @@ def _put_signals(put: Put, level: LoadedLevel, table: np.ndarray) -> np.ndarray:
     return records
 
 
-def _record(batch: Batch, given: dict[int, int]) -> int:
-    """A level's record; where it says nothing else, speeds are those of gaps."""
+def _record(batch: Batch, slots: dict[int, int]) -> int:
+    """Write a level's record; without others its speed rows are the gap rows."""
     record = [0] * a.LEVEL_INTS
-    for slot, value in {a.CARRIED: -1, a.MOBILITY: -1, a.SPEEDS: given[a.GAPS], **given}.items():
+    for slot, value in {a.CARRIED: -1, a.MOBILITY: -1, a.SPEEDS: slots[a.GAPS], **slots}.items():
         record[slot] = value
     return batch.put("ints", record)
 
 
 def _frequencies(batch: Batch, omega: np.ndarray) -> dict[int, int]:
-    """Where omega (r,) stands, and its inverses, zero where it is."""
+    """Write omega (r,) and its inverses, zero where omega is zero."""
     periods = 1 / omega if omega.all() else np.divide(1.0, omega, out=np.zeros(len(omega)), where=omega > 0)
     return {a.FREQUENCIES: batch.put("numbers", omega), a.PERIODS: batch.put("numbers", periods)}
 
 
 def _put_response(batch: Batch, level: LoadedLevel, basis: int) -> int:
-    """The record of a level's response (response_arrays.py)."""
+    """Write the record of a level's response (response_arrays.py)."""
     response, modal, put = level.response, level.modal, batch.put
     maps = (response.from_displacement, response.from_velocity, response.from_force, response.shapes.T)
     reached = put("ints", response_arrays.reached_modes(maps))
@@ -181,20 +181,20 @@ def _put_response(batch: Batch, level: LoadedLevel, basis: int) -> int:
 
 
 def _free_sizes(level: LoadedLevel) -> np.ndarray:
-    """|A|, |B|, |P| (3, p, r) of a level's response."""
+    """Return |A|, |B|, |P| (3, p, r) of a level's response."""
     response = level.response
     return np.abs([response.from_displacement, response.from_velocity, response.from_force])
 
 
 def _put_basis(batch: Batch, basis: Exponentials) -> int:
-    """The record of a basis (basis_arrays.py), which is still to be described."""
+    """Write the record of a basis (basis_arrays.py), whose description follows."""
     put = batch.put
     powers, rates, scales = put("ints", basis.powers), put("waves", basis.rates), put("numbers", [basis.unit, 0, 0])
     return put("ints", [len(basis.rates), powers, rates, scales, 0, 0])
 
 
 def _put_exits(batch: Batch, level: LoadedLevel, exits: ExitTable, kept: np.ndarray) -> int:
-    """Records of the exits of a level, those of the table that are kept (e,)."""
+    """Write the records of the exits of a level, those of the table that are kept (e,)."""
     signals = _put_signals(batch.put, level, signals_of(level, exits.shares(kept)))
     table = np.full((len(signals), a.EXIT_INTS), -1)
     table[:, : a.SIGNAL], table[:, a.SIGNAL : a.ENTERED] = exits.described[kept], signals
@@ -204,7 +204,7 @@ def _put_exits(batch: Batch, level: LoadedLevel, exits: ExitTable, kept: np.ndar
 
 
 def _turn(put: Put, level: LoadedLevel, element: int, exit_: Exit) -> list[int]:
-    """The signal of the speed that may turn an exit, and the states that it asks for then."""
+    """Return the signal of the velocity on which an exit's requested state depends, and the two states."""
     assert exit_.turn is not None, "only exits that turn have one"
     speed = signal_row(level, element, Exit(exit_.asked, further=(Share(exit_.turn.link, rate=1.0),)))
     asked = [asked_state(level, element, Exit(name)) for name in (exit_.turn.forward, exit_.turn.backward)]

@@ -1,6 +1,6 @@
 """Tables in which the loop finds levels by their keys, and maps by their two levels (arrays.py).
 
-What is not in them it asks for.
+Entries that are missing are requested by the loop (NEED).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ SLOTS = 64  # of a table at first: twice as many as it holds, or more
 
 
 class LevelTables:
-    """The tables in ``buffers``; levels: records in the first, maps: those in the second, by their levels."""
+    """Tables in ``buffers``; levels: records in the first, maps: records in the second, by their levels."""
 
     def __init__(self, buffers: Buffers) -> None:
         self._buffers = buffers
@@ -28,7 +28,7 @@ class LevelTables:
         self._make_maps(SLOTS)
 
     def add_level(self, record: int) -> None:
-        """Let the loop find a level."""
+        """Enter a level in its table."""
         ints = self._buffers.ints
         self.levels.add(record)
         if 2 * len(self.levels) > ints[a.LEVEL_SLOTS]:
@@ -37,7 +37,7 @@ class LevelTables:
             self._enter_level(record)
 
     def add_map(self, source: int, target: int, record: int) -> None:
-        """Let the loop find the map between two levels."""
+        """Enter the map between two levels in its table."""
         ints = self._buffers.ints
         self.maps[source, target] = record
         if 2 * len(self.maps) > ints[a.MAP_SLOTS]:
@@ -46,7 +46,7 @@ class LevelTables:
             self._enter_map(source, target, record)
 
     def clear(self) -> None:
-        """Let the loop ask once more for every level and map."""
+        """Empty both tables."""
         self.levels.clear()
         self.maps.clear()
         ints = self._buffers.ints
@@ -55,14 +55,14 @@ class LevelTables:
             ints[start : start + width * ints[slots]] = 0
 
     def _make_levels(self, slots: int) -> None:
-        """A table of so many slots."""
+        """Make a table of levels with so many slots."""
         table = self._buffers.take("ints", slots)
         self._buffers.ints[a.LEVELS], self._buffers.ints[a.LEVEL_SLOTS] = table, slots
         for record in self.levels:
             self._enter_level(record)
 
     def _make_maps(self, slots: int) -> None:
-        """A table of so many slots."""
+        """Make a table of maps with so many slots."""
         table = self._buffers.take("ints", a.MAP_ENTRY * slots)
         self._buffers.ints[a.MAPS], self._buffers.ints[a.MAP_SLOTS] = table, slots
         for (source, target), record in self.maps.items():

@@ -1,4 +1,4 @@
-"""Scratch memory of the loop in buffers (arrays.py): sets of elements, states, and what a flow and a search take."""
+"""Scratch memory of the loop in buffers (arrays.py): sets of elements, states, and memory of a flow and a search."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ STATES_OF_A_RUN = range(a.CURRENT, a.AFTER + 1, a.STATE_INTS)
 
 
 class ScratchArrays:
-    """Scratch memory for the elements that ``buffers`` describe, and for the levels that come.
+    """Scratch memory for the elements that ``buffers`` describe, and for their levels.
 
-    coordinates, exponentials, exits: the most of a level, for which there is memory. changes: at one instant for which
-    there is room, more are an endless exchange. powers: of a response to one term, for which there is room.
+    coordinates, exponentials, exits: the most of a level for which there is memory. changes: the most at one instant;
+    more are an endless exchange of states. powers: the most of a response to one term for which there is memory.
     """
 
     def __init__(self, buffers: Buffers, terms: int) -> None:
@@ -35,7 +35,9 @@ class ScratchArrays:
         sliding = np.count_nonzero(buffers.numbers[ints[a.LIMITS] :][: self._elements])
         self._rough = int(np.count_nonzero(buffers.numbers[ints[a.STATIC_FRICTIONS] :][: self._elements]))
         self._struck = max(2 * self._rigid + self._rough, int(sliding), 1)
-        self._together = self._rigid + int(np.sum(ints[ints[a.STICKS] :][: self._elements] >= 0))  # held at once
+        self._together = self._rigid + int(
+            np.sum(ints[ints[a.STICKS] :][: self._elements] >= 0)
+        )  # the most links held at once
         self.coordinates = self.exponentials = self.exits = 0
         self.changes = ROUNDS * (3 * self._elements + 1) + int(ints[a.KNOTS])
         self.powers = ints[a.FORCED_ROOM] = POWERS
@@ -43,11 +45,11 @@ class ScratchArrays:
         buffers.ints[a.CHANGE_ROOM] = self.changes
 
     def reserve(self, n: int, free: int, exits: int) -> None:
-        """Memory for levels of n coordinates, so many exponentials of the free response and so many exits."""
+        """Reserve memory for levels of n coordinates, so many exponentials of the free response and so many exits."""
         p = free + int(self._buffers.ints[a.PRESCRIBED]) * self.powers
-        known = self.coordinates, self.exponentials, self.exits
-        n, p, exits = map(max, (n, p, exits), known)
-        if (n, p, exits) == known:
+        reserved = self.coordinates, self.exponentials, self.exits
+        n, p, exits = map(max, (n, p, exits), reserved)
+        if (n, p, exits) == reserved:
             return
         self.coordinates, self.exponentials, self.exits = n, p, exits
         self._take(self._of_levels(n, p, max(2 * exits, 1)))
@@ -64,7 +66,7 @@ class ScratchArrays:
             self.reserve_state(a.COMPRESSED, self._wide(n), max(exits, self._elements))
 
     def reserve_state(self, state: int, n: int, exits: int) -> None:
-        """Memory for a state of n coordinates and so many exits."""
+        """Reserve memory for a state of n coordinates and so many exits."""
         for part in range(a.PLACE, a.SWING + 1):
             place = self._buffers.take("numbers", n)
             self._buffers.ints[state + part] = place
@@ -72,21 +74,21 @@ class ScratchArrays:
         self._buffers.ints[state + a.PHASES] = place
 
     def reserve_powers(self, free: int) -> None:
-        """Room for the powers that a response to a term has taken, where levels have ``free`` exponentials at most."""
+        """Enlarge the memory to the powers that a response has, for levels of at most ``free`` exponentials."""
         wanted = 2 * int(self._buffers.ints[a.FORCED_WANTED])
         self.powers = self._buffers.ints[a.FORCED_ROOM] = wanted
         self._buffers.ints[a.FORCED_WANTED] = 0
         self.reserve(self.coordinates, free, self.exits)
 
     def _take(self, sizes: dict[str, dict[int, int]]) -> None:
-        """So much memory of each buffer for every slot."""
+        """Reserve memory of each buffer for every slot."""
         for name, slots in sizes.items():
             for slot, count in slots.items():
                 place = self._buffers.take(name, count)
                 self._buffers.ints[slot] = place
 
     def _sets(self) -> dict[str, dict[int, int]]:
-        """Memory that depends on the elements alone."""
+        """Return the sizes of the memory that depends on the elements alone."""
         ints, c, struck, changes = self._buffers.ints, self._elements, self._struck, self.changes
         m = int(ints[a.COORDINATES])
         return {
@@ -99,7 +101,7 @@ class ScratchArrays:
         }
 
     def _of_levels(self, n: int, p: int, signals: int) -> dict[str, dict[int, int]]:
-        """Memory that depends on the levels. Impacts happen in all modes too, at the start."""
+        """Return the sizes of the memory that depends on the levels. Impacts happen in all modes too, at the start."""
         ints, struck, terms = self._buffers.ints, self._struck, self._terms
         wide = self._wide(n)
         q, room = int(ints[a.PRESCRIBED]), max(self.powers, terms) if ints[a.CHANNELS] else 0
@@ -117,26 +119,26 @@ class ScratchArrays:
         }
 
     def _wide(self, n: int) -> int:
-        """The most unknowns of an impact; it may happen in all modes too."""
+        """Return the largest number of unknowns of an impact; it may happen in all modes too."""
         ints = self._buffers.ints
         return max(int(ints[a.COORDINATES] + ints[a.CHANNELS]), n) if self._rigid else n
 
     def _reserve_problem(self, n: int) -> None:
-        """Memory for the small problem of impacts (principal_pivoting.py)."""
+        """Reserve memory for the small problem of impacts (principal_pivoting.py)."""
         memory = self._buffers.take("numbers", problem_numbers(self._struck, self._wide(n)))
         lay_out(self._buffers.ints, int(self._buffers.ints[a.SMALL_PROBLEM]), self._struck, self._wide(n), memory)
 
     def _reserve_flow(self, p: int) -> None:
-        """A record for the basis of a motion with channels, of p exponentials."""
+        """Reserve a record for the basis of a motion with channels, of p exponentials."""
         take, record = self._buffers.take, self._buffers.take("ints", basis_arrays.BASIS)
-        given = {basis_arrays.POWERS: take("ints", p), basis_arrays.RATES: take("waves", p)}
-        given[basis_arrays.SCALES] = take("numbers", 3)
-        for slot, value in given.items():
+        slots = {basis_arrays.POWERS: take("ints", p), basis_arrays.RATES: take("waves", p)}
+        slots[basis_arrays.SCALES] = take("numbers", 3)
+        for slot, value in slots.items():
             self._buffers.ints[record + slot] = value
         self._buffers.ints[a.FLOW_RECORD] = record
 
     def _carry_over(self, state: int, old: np.ndarray) -> None:
-        """A state from the memory that was too small."""
+        """Copy a state from the memory that was too small."""
         ints, numbers, level = self._buffers.ints, self._buffers.numbers, int(old[a.LEVEL])
         n, exits = int(ints[level + a.MODES] + ints[a.CHANNELS]), int(ints[level + a.EXIT_COUNT])
         for part in range(a.PLACE, a.SWING + 1):

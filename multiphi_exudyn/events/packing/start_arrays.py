@@ -1,4 +1,4 @@
-"""Entering: starts of runs, or the state that one goes on from, into the arrays of its levels."""
+"""Starts of runs, or the state from which a run continues, written into the arrays of its levels."""
 
 from __future__ import annotations
 
@@ -22,10 +22,9 @@ Measure = Callable[[np.ndarray, np.ndarray, int], None]
 class Start(Shown):
     """y, y' (m,) in base coordinates; compliant contacts that start closed, rigid ones that start at their gap.
 
-    penetrating: with the friction that sticks. gaps: (c,) [m] of all contacts at y = 0, as stops that have moved, and
-    held places, leave them.
-    states: numbers of all elements' states, those contacts closed. held: places (h,) that links hold.
-    time [s], state: when the run begins, and of one that goes on from another what that has come to.
+    penetrating: includes the friction that sticks. gaps: (c,) [m] of all contacts at y = 0, with the stops and held
+    displacements at the start. states: numbers of all elements' states, those contacts closed. held: displacements (h,)
+    that links hold. time [s], state: of the start, and the final state of the run that is continued, if any.
     """
 
     displacement: np.ndarray
@@ -44,7 +43,7 @@ class Start(Shown):
 
 
 def set_starts(arrays: LevelArrays, starts: Sequence[Start]) -> None:
-    """The starts of runs, the first of which begins with the next call of the loop (first_state.py)."""
+    """Write the starts of runs, the first of which begins with the next call of the loop (first_state.py)."""
     arrays.reserve_starts(len(starts))
     ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
     place, here = ints[a.STARTS : a.START_STATES + 1].tolist()
@@ -60,7 +59,7 @@ def set_starts(arrays: LevelArrays, starts: Sequence[Start]) -> None:
 
 
 def _springs(arrays: LevelArrays, start: Start) -> float:
-    """Strain energy [J] of the links that hold by their springs."""
+    """Return the strain energy [J] of the links that hold by their springs."""
     base, ints, numbers = arrays.levels.model.base, arrays.ints, arrays.numbers
     links = [k for k in start.penetrating if np.isfinite(base.stiffnesses[k])]
     place = np.concatenate([start.displacement, numbers[ints[a.DRIVE] :][: ints[a.PRESCRIBED]], start.held])
@@ -78,7 +77,7 @@ def set_state(
     phases: Sequence[int],
     measured: Measure = measure,
 ) -> None:
-    """The current state: xi, xi' (n,) in a level, the phases of its exits; measured: ``measure``, or compiled."""
+    """Write the current state: xi, xi' (n,) in a level, the phases of its exits; measured: ``measure``, or compiled."""
     n, state, ints, numbers = len(place), a.CURRENT, arrays.ints, arrays.numbers
     ints[state + a.LEVEL] = level
     for part, values in ((a.PLACE, place), (a.SPEED, speed)):

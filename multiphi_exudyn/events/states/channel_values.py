@@ -1,4 +1,4 @@
-"""Drive: the terms of the channels that hold now, and w, w', w'' with the sizes of their terms, all (q,).
+"""Values of the channels: the terms of their present pieces, and w, w', w'' with the sizes of their terms, all (q,).
 
 w(t) = Re sum_j exp(mu_j s) sum_d a_jd s^d,   s = t - t_i                         (arrays.py, piece)
 """
@@ -30,24 +30,24 @@ __all__ = ["keep_drive", "load_piece", "piece_end", "set_drive"]
 
 @compiled
 def load_piece(ints: Ints, waves: Waves) -> None:
-    """The terms of the present piece, as they are at its start, become those that hold now."""
-    piece, moved, q = ints[ints[PIECES] + ints[PIECE]], ints[DRIVE_WAVES], ints[PRESCRIBED]
+    """Make the terms of the present piece, as they are at its start, the present terms."""
+    piece, target, q = ints[ints[PIECES] + ints[PIECE]], ints[DRIVE_WAVES], ints[PRESCRIBED]
     ints[PIECE_NOW] = piece
     for term in range(ints[piece + PIECE_TERMS]):
-        count, given = ints[piece + TERM_INTS + 2 * term], ints[piece + TERM_INTS + 2 * term + 1]
+        count, source = ints[piece + TERM_INTS + 2 * term], ints[piece + TERM_INTS + 2 * term + 1]
         for k in range(count * q):
-            waves[moved + k] = waves[given + 1 + k]
-        moved += count * q
+            waves[target + k] = waves[source + 1 + k]
+        target += count * q
 
 
 @compiled
 def set_drive(ints: Ints, numbers: Numbers, waves: Waves, result: int, delay: float, time: float, until: float) -> None:
-    """The terms that hold a delay after those in DRIVE_WAVES, from ``time`` to ``until`` [s], by synthetic division.
+    """Set the terms at a delay after those in DRIVE_WAVES, from ``time`` to ``until`` [s], by synthetic division.
 
-    With them w, w', w'' (3, q) and the sizes of their terms (3, q). The horizon of motions that begin there is the
-    power of two above what is left: bases are shared among pieces of about the same length.
+    With them w, w', w'' (3, q) and the sizes of their terms (3, q) are set. The horizon of motions that begin there is
+    the power of two above the remaining time, so that bases are shared among pieces of about the same length.
     """
-    q, drive, moved, piece = ints[PRESCRIBED], ints[DRIVE], ints[DRIVE_WAVES], ints[PIECE_NOW]
+    q, drive, source, piece = ints[PRESCRIBED], ints[DRIVE], ints[DRIVE_WAVES], ints[PIECE_NOW]
     numbers[HORIZON] = power_of_two_above(until - time if until > time else until)
     ints[TERMS_NOW] = result
     for k in range(6 * q):
@@ -59,7 +59,7 @@ def set_drive(ints: Ints, numbers: Numbers, waves: Waves, result: int, delay: fl
             size, angle = exponential_size(rate.real * delay), rate.imag * delay
             factor = complex(size * math.cos(angle), size * math.sin(angle))
         for k in range(count * q):
-            waves[result + k] = waves[moved + k] * factor
+            waves[result + k] = waves[source + k] * factor
         for k in range(q):
             for lowest in range(count - 1):
                 for d in range(count - 2, lowest - 1, -1):
@@ -77,13 +77,13 @@ def set_drive(ints: Ints, numbers: Numbers, waves: Waves, result: int, delay: fl
             numbers[drive + 3 * q + k] += magnitude(waves, result + k)
             numbers[drive + 4 * q + k] += modulus(first.real, first.imag)
             numbers[drive + 5 * q + k] += modulus(second.real, second.imag)
-        moved += count * q
+        source += count * q
         result += count * q
 
 
 @compiled
 def keep_drive(ints: Ints, waves: Waves) -> None:
-    """The terms of the instant become those that hold now."""
+    """Make the terms of the instant the present terms."""
     q, piece, count = ints[PRESCRIBED], ints[PIECE_NOW], 0
     for term in range(ints[piece + PIECE_TERMS]):
         count += ints[piece + TERM_INTS + 2 * term] * q
@@ -93,5 +93,5 @@ def keep_drive(ints: Ints, waves: Waves) -> None:
 
 @compiled
 def piece_end(ints: Ints, numbers: Numbers) -> float:
-    """When [s] the present piece of the channels ends."""
+    """Return the end [s] of the present piece of the channels."""
     return numbers[ints[ints[ints[PIECES] + ints[PIECE]] + PIECE_TIMES] + 1]

@@ -1,13 +1,13 @@
-"""Defects of a run as they happen: what levels entered cannot hold, added up for its warnings (defect_forms.py).
+"""Defects of a run: the parts of motions that the levels entered cannot hold (defect_forms.py), summed for warnings.
 
-At the start d = y - V xi - y_inf and w = (v - V xi') / Omega, row by row; between levels by the triangular factors of
-their map: of the state before alone where one map has made the state after, else also of what was changed beside it,
+At the start d = y - V xi - y_inf and w = (v - V xi') / Omega, row by row. Between levels the triangular factors of the
+map are used: on the state before alone if one map has made the state after, else also on the changes beside the map,
 
     s = T xi_l + c - xi_m,   s' = T' xi'_l - xi'_m
 
-A rigid contact that is struck and opens again takes more out than the factors know: where it alone is
-struck, that goes with the square of its impulse; where several are, or an instant passed through further levels, the
-sum is nan.
+A rigid contact that is struck and opens again removes more than the factors hold. If it alone is struck, that part is
+proportional to the square of its impulse. If several are struck, or an instant passes through further levels, the sum
+is nan.
 """
 
 from __future__ import annotations
@@ -44,50 +44,53 @@ from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compil
 
 __all__ = ["add_defect", "add_start_defect"]
 
-NOBODY, STAYS, LEAVES = 0, 1, 2
+NO_IMPACT, STAYS_CLOSED, REOPENS = 0, 1, 2
 
 
 @compiled
 def add_defect(ints: Ints, numbers: Numbers, before: int, after: int) -> None:
-    """Adds |d|^2 + |w / Omega|^2 between two states of an instant with the changes that are listed."""
-    struck, way = who_is_struck(ints, numbers, after), -1
-    if ints[JUDGED] == 0 or (struck == NOBODY and ints[before + LEVEL] == ints[after + LEVEL]):
+    """Add |d|^2 + |w / Omega|^2 between two states of an instant, with its listed changes."""
+    struck, map_record = impact_kind(ints, numbers, after), -1
+    if ints[JUDGED] == 0 or (struck == NO_IMPACT and ints[before + LEVEL] == ints[after + LEVEL]):
         return
-    if struck == LEAVES and ints[before + LEVEL] == ints[after + LEVEL]:
-        numbers[DEFECTS] += left_by_impact(ints, numbers, ints[ints[after + LEVEL] + STRUCK_DEFECTS])
+    if struck == REOPENS and ints[before + LEVEL] == ints[after + LEVEL]:
+        numbers[DEFECTS] += impact_defect(ints, numbers, ints[ints[after + LEVEL] + STRUCK_DEFECTS])
         return
-    if struck != LEAVES:
-        way = find_map(ints, ints[before + LEVEL], ints[after + LEVEL])
-    if way < 0 or ints[way + MAP_DEFECT] < 0:
+    if struck != REOPENS:
+        map_record = find_map(ints, ints[before + LEVEL], ints[after + LEVEL])
+    if map_record < 0 or ints[map_record + MAP_DEFECT] < 0:
         numbers[DEFECTS] = math.nan
         return
     n, further = ints[ints[before + LEVEL] + MODES] + ints[CHANNELS], ints[ints[after + LEVEL] + MODES] + ints[CHANNELS]
     x, v, count, width = ints[before + PLACE], ints[before + SPEED], n, 1 + n + further
     if ints[MAPPED_AGAIN] == 1 or ints[SPEEDS_CHANGED] == 1:
-        list_changed(ints, numbers, way, before, after)
+        list_differences(ints, numbers, map_record, before, after)
         x, v, count = ints[WORK_NUMBERS], ints[WORK_NUMBERS] + n + further, n + further
-    numbers[DEFECTS] += squares(numbers, ints[way + MAP_DEFECT], width, x, v, count)
+    numbers[DEFECTS] += squares(numbers, ints[map_record + MAP_DEFECT], width, x, v, count)
 
 
 @compiled
-def list_changed(ints: Ints, numbers: Numbers, way: int, before: int, after: int) -> None:
-    """(xi, s) and (xi', s') (2, n + n_after) into WORK_NUMBERS; s is zero where one map has made the places."""
+def list_differences(ints: Ints, numbers: Numbers, map_record: int, before: int, after: int) -> None:
+    """Write (xi, s) and (xi', s') (2, n + n_after) to WORK_NUMBERS; s is zero if one map has made the displacements."""
     n, further = ints[ints[before + LEVEL] + MODES] + ints[CHANNELS], ints[ints[after + LEVEL] + MODES] + ints[CHANNELS]
     x, v, changed = ints[before + PLACE], ints[before + SPEED], ints[MAPPED_AGAIN] == 1
     places, speeds = ints[WORK_NUMBERS], ints[WORK_NUMBERS] + n + further
     for i in range(n):
         numbers[places + i] = numbers[x + i]
         numbers[speeds + i] = numbers[v + i]
-    s, slowed, sizes = places + n, speeds + n, speeds + n + further
-    map_state(ints, numbers, way, way, x, v, n, n, further, s, slowed, sizes)
+    s, s_rate, sizes = places + n, speeds + n, speeds + n + further
+    map_state(ints, numbers, map_record, map_record, x, v, n, n, further, s, s_rate, sizes)
     for i in range(further):
         numbers[s + i] = numbers[s + i] - numbers[ints[after + PLACE] + i] if changed else 0.0
-        numbers[slowed + i] -= numbers[ints[after + SPEED] + i]
+        numbers[s_rate + i] -= numbers[ints[after + SPEED] + i]
 
 
 @compiled
 def squares(numbers: Numbers, factors: int, width: int, x: int, v: int, count: int) -> float:
-    """|R (1, x, 0)|^2 + |R' (v, 0)|^2 of triangular factors R (width, width) and R', one narrower; x, v: (count,)."""
+    """Return |R (1, x, 0)|^2 + |R' (v, 0)|^2 of triangular factors R (width, width) and R', one narrower.
+
+    x, v: (count,).
+    """
     displaced, moving, constant = factors + 1, factors + width * width, numbers[factors]
     for j in range(count):
         constant += numbers[displaced + j] * numbers[x + j]
@@ -104,19 +107,19 @@ def squares(numbers: Numbers, factors: int, width: int, x: int, v: int, count: i
 
 
 @compiled
-def who_is_struck(ints: Ints, numbers: Numbers, after: int) -> int:
-    """Whether a change is an impact, and all contacts that are struck stay closed: NOBODY, STAYS or LEAVES."""
-    states, result = ints[ints[after + LEVEL] + STATES], NOBODY
+def impact_kind(ints: Ints, numbers: Numbers, after: int) -> int:
+    """Return NO_IMPACT, STAYS_CLOSED if all contacts that are struck stay closed, or REOPENS."""
+    states, result = ints[ints[after + LEVEL] + STATES], NO_IMPACT
     for k in range(ints[CHANGE_COUNT]):
         change = ints[CHANGES] + k * CHANGE_WIDTH
         if numbers[ints[CHANGE_IMPULSES] + k] > 0.0 and ints[change + 1] != SHARED:
-            result = max(result, LEAVES if ints[states + ints[change]] == OPEN else STAYS)
+            result = max(result, REOPENS if ints[states + ints[change]] == OPEN else STAYS_CLOSED)
     return result
 
 
 @compiled
-def left_by_impact(ints: Ints, numbers: Numbers, sizes: int) -> float:
-    """|w / Omega|^2 of a contact that was struck and has opened again; nan where there are several."""
+def impact_defect(ints: Ints, numbers: Numbers, sizes: int) -> float:
+    """Return |w / Omega|^2 of a contact that was struck and has opened again; nan if there are several."""
     count, result = 0, math.nan
     for k in range(ints[CHANGE_COUNT]):
         change, impulse = ints[CHANGES] + k * CHANGE_WIDTH, numbers[ints[CHANGE_IMPULSES] + k]
@@ -128,15 +131,15 @@ def left_by_impact(ints: Ints, numbers: Numbers, sizes: int) -> float:
 
 @compiled
 def add_start_defect(ints: Ints, numbers: Numbers) -> None:
-    """Adds |d|^2 + |w / Omega|^2 of the start from GIVEN to CURRENT; nan where a rigid link holds."""
+    """Add |d|^2 + |w / Omega|^2 of the start from GIVEN to CURRENT; nan if a rigid link holds."""
     if ints[JUDGED] == 0:
         return
     level, base = ints[CURRENT + LEVEL], ints[GIVEN + LEVEL]
-    way = find_map(ints, base, level)
-    if way < 0 or ints[way + MAP_DEFECT] < 0 or who_is_struck(ints, numbers, CURRENT) != NOBODY:
+    map_record = find_map(ints, base, level)
+    if map_record < 0 or ints[map_record + MAP_DEFECT] < 0 or impact_kind(ints, numbers, CURRENT) != NO_IMPACT:
         numbers[DEFECTS] = math.nan
         return
-    n, row = ints[level + MODES] + ints[CHANNELS], ints[way + MAP_DEFECT]
+    n, row = ints[level + MODES] + ints[CHANNELS], ints[map_record + MAP_DEFECT]
     for i in range(ints[COORDINATES]):
         d = numbers[ints[GIVEN + PLACE] + i] - numbers[row + n]
         w = numbers[ints[GIVEN + SPEED] + i]

@@ -1,4 +1,4 @@
-"""Energies of a state, and what a transition loses of them."""
+"""Energies of a state, and the losses in a transition."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ __all__ = ["energy", "kinetic", "lose", "pattern_work", "potential", "strain"]
 
 @compiled
 def kinetic(ints: Ints, numbers: Numbers, state: int) -> float:
-    """Kinetic energy [J]: |Psi eta' + Y w'|^2 / 2."""
+    """Return the kinetic energy [J]: |Psi eta' + Y w'|^2 / 2."""
     level, v = ints[state + LEVEL], ints[state + SPEED]
     r, q, row = ints[level + MODES], ints[CHANNELS], ints[level + CARRIED]
     total = 0.0
@@ -58,7 +58,7 @@ def kinetic(ints: Ints, numbers: Numbers, state: int) -> float:
 
 @compiled
 def potential(ints: Ints, numbers: Numbers, state: int) -> float:
-    """Strain energy less the potential of the loads [J]."""
+    """Return the strain energy less the potential of the loads [J]."""
     level, x = ints[state + LEVEL], ints[state + PLACE]
     r, q, form = ints[level + MODES], ints[CHANNELS], ints[level + POTENTIAL]
     n = r + q
@@ -86,7 +86,7 @@ def potential(ints: Ints, numbers: Numbers, state: int) -> float:
 
 @compiled
 def pattern_work(ints: Ints, numbers: Numbers, state: int) -> float:
-    """Potential [J] that the varying loads have at their present values: (b w) . y."""
+    """Return the potential [J] of the varying loads at their present values: (b w) . y."""
     level, x = ints[state + LEVEL], ints[state + PLACE]
     r, q, row = ints[level + MODES], ints[CHANNELS], ints[level + PATTERNS]
     total = 0.0
@@ -101,13 +101,13 @@ def pattern_work(ints: Ints, numbers: Numbers, state: int) -> float:
 
 @compiled
 def energy(ints: Ints, numbers: Numbers, state: int) -> float:
-    """Kinetic and strain energy less the potential of static loads [J]."""
+    """Return the kinetic and strain energy less the potential of static loads [J]."""
     return kinetic(ints, numbers, state) + potential(ints, numbers, state) + pattern_work(ints, numbers, state)
 
 
 @compiled
 def strain(ints: Ints, numbers: Numbers, state: int) -> float:
-    """Strain energy [J], which is no difference of large energies (StrainForm); nan where nobody has asked for it."""
+    """Return the strain energy [J] (StrainForm), no difference of large energies; nan if its form is not packed."""
     level, x = ints[state + LEVEL], ints[state + PLACE]
     form, n, total = ints[level + STRAIN_FORM], ints[level + MODES] + ints[CHANNELS], 0.0
     if form == 0:
@@ -126,19 +126,19 @@ def strain(ints: Ints, numbers: Numbers, state: int) -> float:
 
 @compiled
 def lose(ints: Ints, numbers: Numbers, before: int, after: int, collided: float, losses: int) -> None:
-    """Add what is lost between two states of one instant to losses (6,), less the energy ``collided`` in an impact.
+    """Add the losses (6,) between two states of one instant, less the energy ``collided`` lost in an impact.
 
-    Viscous contacts that open inside their stop lose what their springs hold, those that close there bring it back.
-    A spring that begins to slip loses what it held more than it keeps: the drop from its static limit.
+    Viscous contacts that open inside their stop lose the energy of their springs, and those that close there regain it.
+    A spring that begins to slip loses the difference of its energies before and after the drop from its static limit.
     """
     relaxed, dropped = 0.0, 0.0
     states, later = ints[ints[before + LEVEL] + STATES], ints[ints[after + LEVEL] + STATES]
     for i in range(ints[ELEMENTS]):
-        opened, opens = ints[states + i] == OPEN, ints[later + i] == OPEN
-        if ints[ints[KINDS] + i] == VISCOUS and opened != opens:
+        was_open, is_open = ints[states + i] == OPEN, ints[later + i] == OPEN
+        if ints[ints[KINDS] + i] == VISCOUS and was_open != is_open:
             depth = gap(ints, numbers, before, i)
             stored = 0.5 * numbers[ints[STIFFNESSES] + i] * depth * depth
-            relaxed += stored if opens else -stored
+            relaxed += stored if is_open else -stored
         sticks = ints[ints[STICKS] + i]
         if sticks >= 0 and ints[states + i] == sticks and ints[later + i] != sticks:
             stretch = gap(ints, numbers, before, ints[ints[HELD_LINKS] + i])

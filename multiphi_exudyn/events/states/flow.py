@@ -1,10 +1,10 @@
-"""Flow in flat arrays: the motion from a state, as long as one piece of every channel lasts.
+"""Flow in flat arrays: the motion from a state, within one piece of every channel.
 
     xi(t) = Re V (c phi(t)) + Re sum_j exp(mu_j t) sum_k x_jk (t/T)^k
 
-xi = (eta, w); phi the p exponentials of the free response, x (n,) its response to the channels' pieces and these
-themselves, T the horizon, a power of two. What is made of a state stands in the scratch memory of the flow: its basis,
-the coefficients c of its exponentials (one for each x), of which terms they are the sums, and the x.
+xi = (eta, w); phi the p exponentials of the free response, x (n,) the forced response to the channels' pieces and these
+themselves, T the horizon, a power of two. The scratch memory of the flow holds its basis, the coefficients c of its
+exponentials (one for each x), the sizes of their terms, and the x.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ __all__ = ["expand", "signal_sizes", "signal_waves", "state_at", "step_on"]
 
 @compiled
 def expand(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
-    """Fill in the flow from a state."""
+    """Compute the flow from a state."""
     level, c, x, v = ints[state + LEVEL], ints[FLOW_WAVES], ints[state + PLACE], ints[state + SPEED]
     response, force = ints[level + RESPONSE], ints[level + FORCE]
     p = ints[ints[response + FREE] + SIZE]
@@ -88,7 +88,7 @@ def expand(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
 
 @compiled
 def unit_of_flow(ints: Ints, numbers: Numbers, basis: int, j: int) -> float:
-    """By what a coefficient on the basis of the free response is multiplied for that of the flow."""
+    """Return the factor from a coefficient on the basis of the free response to that of the flow."""
     ratio, unit = numbers[ints[ints[FLOW_BASIS] + SCALES]] / numbers[ints[basis + SCALES]], 1.0
     for _ in range(ints[ints[basis + POWERS] + j]):
         unit *= ratio
@@ -97,10 +97,10 @@ def unit_of_flow(ints: Ints, numbers: Numbers, basis: int, j: int) -> float:
 
 @compiled
 def force_flow(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
-    """The response to the channels' terms, with these, as x_k of the flow, and its basis.
+    """Compute the response to the channels' terms, with these terms, as x_k of the flow, and its basis.
 
-    Left in the memory of the flow: what of eta and eta' at the start is not forced (2, r). Where there is no room for
-    as many powers as a response takes, FORCED_WANTED says for how many.
+    FLOW_STATE becomes eta and eta' at the start without the forced response (2, r). If there is too little memory for
+    the powers of a response, FORCED_WANTED is set to their number.
     """
     level, q, horizon = ints[state + LEVEL], ints[PRESCRIBED], numbers[HORIZON]
     r, free, given, moved = ints[level + MODES], ints[FLOW_FREE], ints[PIECE_NOW], ints[TERMS_NOW]
@@ -135,7 +135,7 @@ def force_flow(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
 
 @compiled
 def force_modes(ints: Ints, numbers: Numbers, waves: Waves, level: int, carrier: int, moved: int, degree: int) -> None:
-    """A term in powers of t / T, and its modal forces P w + Q w' (degree + 1, r)."""
+    """Write a term in powers of t / T, and its modal forces P w + Q w' (degree + 1, r)."""
     r, q, horizon, rate = ints[level + MODES], ints[PRESCRIBED], numbers[HORIZON], waves[carrier]
     n, scale, scaled = r + ints[CHANNELS], 1.0, ints[SCALED_TERM]
     for d in range(degree + 1):
@@ -167,7 +167,7 @@ def add_forced(
     rows: int,
     count: int,
 ) -> None:
-    """List the response (rows, r) to a term, and the term itself, behind ``count`` exponentials."""
+    """Append the response (rows, r) to a term, and the term itself, behind ``count`` exponentials."""
     r, q, record, own = ints[level + MODES], ints[PRESCRIBED], ints[FLOW_RECORD], ints[FLOW_STATE]
     n, rate = r + q, waves[carrier]
     for k in range(max(rows, degree + 1)):
@@ -211,7 +211,7 @@ def size_terms(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
 
 @compiled
 def size_driven_terms(ints: Ints, numbers: Numbers, state: int) -> None:
-    """The same of the free response beside channels: what is forced may be larger than the motion."""
+    """Compute the same of the free response beside channels, where the forced response may exceed the motion."""
     level, own, x, v = ints[state + LEVEL], ints[FLOW_STATE], ints[state + PLACE], ints[state + SPEED]
     response, force, p, r = ints[level + RESPONSE], ints[level + FORCE], ints[FLOW_FREE], ints[level + MODES]
     for j in range(p):
@@ -227,7 +227,7 @@ def size_driven_terms(ints: Ints, numbers: Numbers, state: int) -> None:
 
 @compiled
 def signal_waves(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal: int, result: int) -> None:
-    """Coefficients (p,) of a signal on the flow from a state, without its constant."""
+    """Compute the coefficients (p,) of a signal on the flow from a state, without its constant."""
     n, row, c = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW], ints[FLOW_WAVES]
     moving = n - ints[CHANNELS] + ints[PRESCRIBED]
     free, count, rate = ints[FLOW_FREE], ints[FLOW_COUNT], ints[WORK_WAVES] + ints[FLOW_COUNT]
@@ -252,7 +252,7 @@ def signal_waves(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal:
 
 @compiled
 def signal_sizes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal: int, result: int) -> None:
-    """Of which terms (p,) the coefficients of a signal are the sums.
+    """Compute the sizes (p,) of the terms of a signal's coefficients.
 
     |row.V| |c| + |row'.V| |c| |lambda|, and of a power d > 0 its derivative d / T at the one before.
     """
@@ -285,7 +285,7 @@ def signal_sizes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal:
 
 @compiled
 def state_at(ints: Ints, numbers: Numbers, waves: Waves, level: int, t: float, x: int, v: int) -> None:
-    """xi, xi' of the flow a time t after its state; held channels stay what they are."""
+    """Compute xi, xi' of the flow at a time t after its state; held channels keep their values."""
     basis, phi = ints[FLOW_BASIS], ints[WORK_WAVES]
     exponentials(ints, numbers, waves, basis, t, t, phi)
     differentiate(ints, numbers, waves, basis, ints[FLOW_WAVES], phi + ints[FLOW_COUNT])
@@ -294,9 +294,9 @@ def state_at(ints: Ints, numbers: Numbers, waves: Waves, level: int, t: float, x
 
 @compiled
 def step_on(ints: Ints, numbers: Numbers, waves: Waves, level: int, step: float, again: int, x: int, v: int) -> None:
-    """``state_at`` a step [s] after the time that was asked about last, ``again`` 1 where that was one step on too.
+    """Compute the state a step [s] after that of the last call; again: 1 if the last call made the same step.
 
-    Of a flow without powers of time the exponentials are multiplied by those of the step.
+    For a flow without powers of time the exponentials are multiplied by those of the step.
     """
     basis, phi, p = ints[FLOW_BASIS], ints[WORK_WAVES], ints[FLOW_COUNT]
     if again == 0:
@@ -308,7 +308,7 @@ def step_on(ints: Ints, numbers: Numbers, waves: Waves, level: int, step: float,
 
 @compiled
 def sum_flow(ints: Ints, numbers: Numbers, waves: Waves, level: int, x: int, v: int) -> None:
-    """xi, xi' from the exponentials at a time, and the coefficients of their derivatives."""
+    """Sum xi, xi' from the exponentials at a time, and the coefficients of their derivatives."""
     r, basis, response = ints[level + MODES], ints[FLOW_BASIS], ints[level + RESPONSE]
     n, free, count, c = r + ints[PRESCRIBED], ints[FLOW_FREE], ints[FLOW_COUNT], ints[FLOW_WAVES]
     phi, rate = ints[WORK_WAVES], ints[WORK_WAVES] + ints[FLOW_COUNT]

@@ -1,4 +1,4 @@
-"""Levels found by their keys, and states moved between them.
+"""Levels found by their keys, and states mapped between them.
 
 xi_m = T xi_l + c,   xi'_m = T' xi'_l + c'                                        (38.6)
 """
@@ -44,7 +44,7 @@ HASH_MODULUS = 1_000_003  # of keys: products of it with small numbers stay far 
 
 @compiled
 def level_hash(ints: Ints, key: int) -> int:
-    """A number made of a key (c,)."""
+    """Return the hash of a key (c,)."""
     value = 0
     for i in range(ints[ELEMENTS]):
         value = (31 * value + ints[key + i] + 1) % HASH_MODULUS
@@ -53,13 +53,13 @@ def level_hash(ints: Ints, key: int) -> int:
 
 @compiled
 def map_hash(source: int, target: int) -> int:
-    """A number made of two levels."""
+    """Return the hash of two levels."""
     return (source % HASH_MODULUS * 31 + target) % HASH_MODULUS
 
 
 @compiled
 def find_level(ints: Ints, key: int) -> int:
-    """The level with a key (c,); NEED where it has not been packed."""
+    """Return the level with a key (c,); NEED if it has not been packed."""
     c, slots = ints[ELEMENTS], ints[LEVEL_SLOTS]
     slot = level_hash(ints, key) % slots
     while ints[ints[LEVELS] + slot] != 0:
@@ -79,7 +79,7 @@ def find_level(ints: Ints, key: int) -> int:
 
 @compiled
 def find_map(ints: Ints, source: int, target: int) -> int:
-    """The map between two levels; NEED where it has not been packed."""
+    """Return the map between two levels; NEED if it has not been packed."""
     slots = ints[MAP_SLOTS]
     slot = map_hash(source, target) % slots
     while True:
@@ -148,7 +148,7 @@ def map_state(
 
 @compiled
 def size_by_terms(ints: Ints, numbers: Numbers, way: int, part: int, given: int, n: int, rows: int, sizes: int) -> None:
-    """Sizes (rows,) of the terms of xi (part 0) or xi' (part 1) by those of which a map's own numbers are sums."""
+    """Compute the sizes (rows,) of the terms of xi (part 0) or xi' (part 1), from those of the map's numbers."""
     terms, offset = ints[way + MAP_TERMS], ints[way + RATE_OFFSET]
     for i in range(rows):
         size = numbers[terms + n]  # that one is of places

@@ -33,7 +33,7 @@ __all__ = ["gap", "held_part", "mapped_terms", "rate_sign", "row_sign", "sign_of
 
 @compiled
 def sign_of(value: float, size: float) -> int:
-    """Sign of a sum, zero where it is round-off of its terms, which add up to ``size`` without their signs."""
+    """Return the sign of a sum, zero if it is round-off of its terms, whose absolute values add up to ``size``."""
     if abs(value) <= ZERO * size:
         return 0
     return 1 if value > 0.0 else -1
@@ -41,10 +41,10 @@ def sign_of(value: float, size: float) -> int:
 
 @compiled
 def row_sign(ints: Ints, numbers: Numbers, state: int, signal: int, terms: float) -> int:
-    """9. Sign of a signal, zero where it is round-off of its terms.
+    """9. Return the sign of a signal, zero if it is round-off of its terms.
 
-    At the root of a signal all displacements, or velocities, may be round-off of what they were before: |eta'| / omega
-    and omega |eta| count too. terms: what else the signal is a sum of.
+    At the root of a signal all displacements, or velocities, may be round-off of their earlier values: |eta'| / omega
+    and omega |eta| count too. terms: the size of further terms of the signal.
     """
     n, row = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW]
     x, v, reach, swing = ints[state + PLACE], ints[state + SPEED], ints[state + REACH], ints[state + SWING]
@@ -63,9 +63,10 @@ def row_sign(ints: Ints, numbers: Numbers, state: int, signal: int, terms: float
 
 @compiled
 def mapped_terms(ints: Ints, numbers: Numbers, state: int, exit_: int) -> float:
-    """Of which terms the transition that has made a state has made an exit's signal, where it is a reaction, else zero.
+    """Return the size of the terms of a reaction in the transition that has made a state, zero for other signals.
 
-    The displacements of two levels may be large where what presses on a contact is small; a gap is the same in both.
+    The displacements of two levels may be large where the normal force of a contact is small; a gap is the same in
+    both.
     """
     if ints[exit_ + FIRMNESS] != ALWAYS_TAKEN:
         return 0.0
@@ -77,10 +78,10 @@ def mapped_terms(ints: Ints, numbers: Numbers, state: int, exit_: int) -> float:
 
 @compiled
 def rate_sign(ints: Ints, numbers: Numbers, state: int, signal: int) -> int:
-    """9. Sign of a signal's time derivative, zero where it is round-off of its terms.
+    """9. Return the sign of a signal's time derivative, zero if it is round-off of its terms.
 
-    At a turning point all velocities may be round-off of what they were before: omega |eta| counts too. Of a signal
-    with a speed it is a sum of what the accelerations are sums of, which may cancel.
+    At a turning point all velocities may be round-off of their earlier values: omega |eta| counts too. If the signal
+    depends on velocities, the terms of the accelerations count, as they may cancel.
     """
     n, row = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW]
     v, swing, accelerations, terms = (
@@ -106,7 +107,7 @@ def rate_sign(ints: Ints, numbers: Numbers, state: int, signal: int) -> int:
 
 @compiled
 def held_part(ints: Ints, numbers: Numbers, state: int, signal: int) -> float:
-    """What the held channels of a state add to a signal, until the next transition."""
+    """Return the part of a signal due to held channels, constant until the next transition."""
     held = ints[CHANNELS] - ints[PRESCRIBED]
     first, total = ints[ints[state + LEVEL] + MODES] + ints[PRESCRIBED], 0.0
     for k in range(first, first + held):
@@ -116,7 +117,7 @@ def held_part(ints: Ints, numbers: Numbers, state: int, signal: int) -> float:
 
 @compiled
 def gap(ints: Ints, numbers: Numbers, state: int, element: int) -> float:
-    """Gap of a contact [m]."""
+    """Return the gap of a contact [m]."""
     level, x = ints[state + LEVEL], ints[state + PLACE]
     n = ints[level + MODES] + ints[CHANNELS]
     row = ints[level + GAPS] + element * (n + 1)

@@ -2,9 +2,9 @@
 
     eta'' = motion . (xi, xi', 1)                                                     (38.3)
 
-The scales of a state are how far its speeds carry the modes, |eta'| / omega, and how fast its displacements make them,
-omega |eta|: to them belongs the round-off of a motion. A state that a transition has made has the round-off of the
-terms of the map as well, at that instant.
+The scales of a state are the displacements that its velocities lead to, |eta'| / omega, and the velocities that its
+displacements lead to, omega |eta|. The round-off of a motion is relative to them. At the instant of a transition the
+terms of the map count as well.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ __all__ = ["accelerate", "acceleration_sizes", "clear_turning_speeds", "copy_sta
 
 @compiled
 def copy_state(ints: Ints, numbers: Numbers, given: int, result: int) -> None:
-    """A copy of a state, phases included."""
+    """Copy a state, phases included."""
     ints[result + LEVEL] = ints[given + LEVEL]
     ints[result + SETTLED] = ints[given + SETTLED]
     x, v, x_copy, v_copy = ints[given + PLACE], ints[given + SPEED], ints[result + PLACE], ints[result + SPEED]
@@ -53,13 +53,13 @@ def copy_state(ints: Ints, numbers: Numbers, given: int, result: int) -> None:
 
 @compiled
 def same_level(ints: Ints, one: int, other: int) -> int:
-    """1 where two states are of the same level."""
+    """Return 1 if two states are of the same level."""
     return 1 if ints[one + LEVEL] == ints[other + LEVEL] else 0
 
 
 @compiled
 def measure(ints: Ints, numbers: Numbers, state: int) -> None:
-    """Scales of a state: |eta'| / omega and omega |eta|, for given channels the sizes of the terms of w and w'."""
+    """Compute the scales of a state: |eta'| / omega, omega |eta|, and for channels the sizes of w and w'."""
     level, x, v = ints[state + LEVEL], ints[state + PLACE], ints[state + SPEED]
     r, q, reach, swing = ints[level + MODES], ints[PRESCRIBED], ints[state + REACH], ints[state + SWING]
     for i in range(r):
@@ -75,7 +75,7 @@ def measure(ints: Ints, numbers: Numbers, state: int) -> None:
 
 @compiled
 def clear_turning_speeds(ints: Ints, numbers: Numbers, state: int) -> None:
-    """Modal speeds of a state become zero where they are round-off of what the displacement makes of them.
+    """Set modal velocities of a state to zero if they are round-off of omega |eta|.
 
     A mode at its turning point would strike with them, on one processor and not on another.
     """
@@ -87,7 +87,7 @@ def clear_turning_speeds(ints: Ints, numbers: Numbers, state: int) -> None:
 
 @compiled
 def accelerate(ints: Ints, numbers: Numbers, state: int, result: int) -> None:
-    """xi'' (n,)."""
+    """Compute xi'' (n,)."""
     level, x, v = ints[state + LEVEL], ints[state + PLACE], ints[state + SPEED]
     r, q = ints[level + MODES], ints[CHANNELS]
     n = r + q
@@ -104,7 +104,7 @@ def accelerate(ints: Ints, numbers: Numbers, state: int, result: int) -> None:
 
 @compiled
 def acceleration_sizes(ints: Ints, numbers: Numbers, state: int, result: int) -> None:
-    """Of which terms (n,) the accelerations are the sums, and omega |eta'|, how large the velocities make them.
+    """Compute the sizes (n,) of the terms of the accelerations, and omega |eta'|, which the velocities lead to.
 
     A displacement counts with the terms of the map that has made it.
     """

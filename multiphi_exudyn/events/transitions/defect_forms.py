@@ -1,16 +1,16 @@
-"""Forms of defects: what a level cannot hold of the motion that comes into it from another one, or from the base.
+"""Forms of defects: the part of a motion that a level entered, from another one or from the base, cannot hold.
 
     d = P (y - Psi eta - y_inf),   w = Q (v - Psi eta')
 
-as in time/defects.py. From level l to level m the state after is the map's image of the state before (eq. 38.6), but
-for what impacts and further levels at the same instant have changed:
+as in defects.py. From level l to level m the state after is the image of the state before (eq. 38.6), apart from
+changes by impacts and by further levels at the same instant:
 
     s = T xi_l + c - xi_m,   s' = T' xi'_l - xi'_m
     d = P (Psi_l - Psi_m T) xi_l + P (y_l - y_m - Psi_m c) + P Psi_m s
     w = Q (Psi_l - Psi_m T') xi'_l + Q Psi_m s'
 
-Of these maps from (1, xi_l, s) and (xi'_l, s') triangular factors are kept. Where s = 0 their first rows and columns
-are enough; the difference of the levels is formed in them, not that of two states.
+Triangular factors of these maps from (1, xi_l, s) and (xi'_l, s') are kept. If s = 0 their first rows and columns are
+enough. The factors hold the difference of the levels, so no difference of two states is formed.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class DefectForm:
     velocity_matrix: np.ndarray
 
     def squares(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """|defect|^2 (k,) between states (2, k, >= n) at an instant."""
+        """Return |defect|^2 (k,) between states (2, k, >= n) before and after an instant."""
         n_after, n = self.matrix.shape
         (x, v), (x_after, v_after) = before[:, :, :n], after[:, :, :n_after]
         changed = x @ self.matrix.T + self.offset - x_after
@@ -54,92 +54,97 @@ class DefectForm:
         return np.asarray(np.sum(d * d, axis=1) + np.sum(w * w, axis=1))
 
 
-def defect_form(way: Transition, stopped: tuple[int, ...]) -> DefectForm:
-    """The maps into a level, which keeps them: under one load a level has one neighbour with given states."""
-    before, after = way.source, way.target
+def defect_form(transition: Transition, stopped: tuple[int, ...]) -> DefectForm:
+    """Return the maps to defects, kept by the level entered: under one load it has one neighbour with given states."""
+    before, after = transition.source, transition.target
     key = before.states, stopped
     if key not in after.entries:
         base, held = after.level.base, held_rigidly(after)
-        displaced = allowed(base, held, _motion(way, way.matrix))
-        moved, as_displaced = displaced, way.velocity_matrix is way.matrix and held.issuperset(stopped)
+        displaced = allowed(base, held, _motion(transition, transition.matrix))
+        moved, as_displaced = displaced, transition.velocity_matrix is transition.matrix and held.issuperset(stopped)
         if not as_displaced:
-            moved = allowed(base, held | set(stopped), _motion(way, way.velocity_matrix))
+            moved = allowed(base, held | set(stopped), _motion(transition, transition.velocity_matrix))
         rates = factor(over_omega(base, moved[:, 1:]))
-        places = factor(displaced) if way.source.excitation.channels else _factor_beside(displaced, after.level.modes)
-        after.entries[key] = DefectForm(places, rates, way.matrix, way.offset, way.velocity_matrix)
+        places = (
+            factor(displaced) if transition.source.excitation.channels else _factor_beside(displaced, after.level.modes)
+        )
+        after.entries[key] = DefectForm(places, rates, transition.matrix, transition.offset, transition.velocity_matrix)
     form: DefectForm = after.entries[key]
     return form
 
 
 def _factor_beside(rows: np.ndarray, modes: int) -> np.ndarray:
-    """``factor`` of (rest, modes): what modes cannot hold has no part in them, and they are orthonormal."""
+    """Return ``factor`` of (rest, modes): the rest is orthogonal to the modes, which are orthonormal."""
     m, columns = rows.shape
     if m < columns:
         return factor(rows)
-    found, rest = np.eye(columns), columns - modes
-    found[:rest, :rest] = factor(rows[:, :rest])
-    return found
+    result, rest = np.eye(columns), columns - modes
+    result[:rest, :rest] = factor(rows[:, :rest])
+    return result
 
 
-def _motion(way: Transition, matrix: np.ndarray) -> np.ndarray:
-    """The maps (m, 1 + n_l + n_m) from (1, xi_l, s) with T, or with T', to motions, whatever rigid contacts prevent."""
-    before, after = way.source, way.target
+def _motion(transition: Transition, matrix: np.ndarray) -> np.ndarray:
+    """Return the maps (m, 1 + n_l + n_m) from (1, xi_l, s) to motions, without rigid constraints.
+
+    matrix: T, or T'.
+    """
+    before, after = transition.source, transition.target
     source, target = before.level.vectors, after.level.vectors
     n = source.shape[1]
     columns = np.empty((1 + n + target.shape[1], len(source)))  # one after the other, as a factor is formed of them
-    columns[0] = before.asymptotic.configuration - after.asymptotic.configuration - target @ way.offset
+    columns[0] = before.asymptotic.configuration - after.asymptotic.configuration - target @ transition.offset
     np.subtract(source.T, matrix.T @ target.T, out=columns[1 : n + 1])
     columns[n + 1 :] = target.T
     return columns.T
 
 
 def start_form(level: LoadedLevel) -> np.ndarray | None:
-    """(Psi, y_inf) (m, n + 1), with which d = y - Psi xi - y_inf at the start; None where a rigid link holds."""
+    """Return (Psi, y_inf) (m, n + 1), with which d = y - Psi xi - y_inf at the start; None if a rigid link holds."""
     return None if held_rigidly(level) else np.column_stack([level.level.vectors, level.asymptotic.configuration])
 
 
 def struck_defects(level: LoadedLevel) -> np.ndarray:
-    """|w / Omega|^2 (c,) of a rigid contact that an impulse of one strikes and that opens again; nan for others.
+    """Return |w / Omega|^2 (c,) for a unit impulse on a rigid contact that opens again; nan for other contacts.
 
-    The level's modes turn it into V V^T h, of which Q leaves what is across h and the closed rigid contacts. Unknown
-    where contacts rub: their impulse has another direction.
+    The level's modes map the impulse to V V^T h, of which Q keeps the part orthogonal to h and to the closed rigid
+    contacts. It is unknown for contacts with friction, whose impulse has another direction.
     """
     own, base = level.level, level.level.base
-    found, rigid = np.full(len(base.contacts), np.nan), base.frictionless_rigid_contacts
+    result, rigid = np.full(len(base.contacts), np.nan), base.frictionless_rigid_contacts
     if not len(rigid):
-        return found
+        return result
     held, given = held_rigidly(level), base.directions[:, rigid]
     across, motions = allowed(base, held, given), allowed(base, held, own.vectors)
     moved, lengths = motions @ (own.vectors.T @ given), np.einsum("ij,ij->j", across, across)
     along = np.divide(np.einsum("ij,ij->j", across, moved), lengths, out=np.zeros(len(rigid)), where=lengths > 0)
     left = over_omega(base, moved - across * along)
-    found[rigid] = np.einsum("ij,ij->j", left, left)
-    return found
+    result[rigid] = np.einsum("ij,ij->j", left, left)
+    return result
 
 
 def factor(rows: np.ndarray) -> np.ndarray:
-    """R (n, n), upper triangular, with |R z| = |rows z|; the rows (m, n) are lost."""
+    """Return R (n, n), upper triangular, with |R z| = |rows z|; the rows (m, n) are overwritten."""
     n = rows.shape[1]
     square = np.zeros((n, n))
     if rows.size:
-        found = dgeqrf(rows, overwrite_a=True)[0][:n]
-        np.multiply(found, _upper(*found.shape), out=square[: len(found)])
+        result = dgeqrf(rows, overwrite_a=True)[0][:n]
+        np.multiply(result, _upper(*result.shape), out=square[: len(result)])
     return square
 
 
 @functools.lru_cache(maxsize=64)
 def _upper(rows: int, columns: int) -> np.ndarray:
-    """One on the diagonal and above it, zero below."""
+    """Return ones on and above the diagonal, zeros below."""
     return np.triu(np.ones((rows, columns)))
 
 
 def held_rigidly(level: LoadedLevel) -> set[int]:
-    """The rigid links that hold: closed rigid contacts, and rigid friction that sticks."""
+    """Return the rigid links that hold: closed rigid contacts, and rigid friction that sticks."""
     return {i for i in level.level.indices if level.level.base.links[i].rigid}
 
 
 def allowed(base: ModalBase, held: set[int], motion: np.ndarray) -> np.ndarray:
-    """The part of motions (m, ...) that rigid contacts allow."""
+    """Return the part of motions (m, ...) that rigid contacts allow."""
     if not held:
         return motion
     directions = base.directions[:, sorted(held)]
@@ -147,5 +152,5 @@ def allowed(base: ModalBase, held: set[int], motion: np.ndarray) -> np.ndarray:
 
 
 def over_omega(base: ModalBase, motion: np.ndarray) -> np.ndarray:
-    """Motions (m, ...) over Omega, zero where that is zero."""
+    """Return motions (m, ...) over Omega, zero where Omega is zero."""
     return np.asarray((motion.T * base.periods).T)

@@ -1,6 +1,6 @@
-"""Exit table: what describes the exits of a model's elements in all of their states, made once.
+"""Exit table: the description of the exits of a model's elements in all of their states, made once.
 
-A level's are those of the states that its elements are in, in the order of the elements.
+The exits of a level are those of the states of its elements, in the order of the elements.
 """
 
 from __future__ import annotations
@@ -16,41 +16,41 @@ __all__ = ["ExitTable"]
 
 
 class ExitTable:
-    """All exits of elements, in the order of these and of their states.
+    """All exits of elements, in the order of the elements and of their states.
 
-    described: (e, 3) the element of each, the number of the state that it asks for, and its firmness.
+    described: (e, 3) the element of each, the number of the state requested, and its firmness.
     """
 
     def __init__(self, elements: Sequence[Element]) -> None:
-        given = [
+        entries = [
             (i, state, exit_)
             for i, element in enumerate(elements)
-            for state, own in enumerate(element.states)
-            for exit_ in own.exits
+            for state, element_state in enumerate(element.states)
+            for exit_ in element_state.exits
         ]
         self._numbers = np.arange(len(elements) + 1)
-        self._exits = [exit_ for _, _, exit_ in given]
+        self._exits = [exit_ for _, _, exit_ in entries]
         self._turns = [k for k, exit_ in enumerate(self._exits) if exit_.turn is not None]
-        self._states = np.array([state for _, state, _ in given], int)
-        self._shares = ExitShares.of(link_indices(elements), [(i, exit_) for i, _, exit_ in given])
+        self._states = np.array([state for _, state, _ in entries], int)
+        self._shares = ExitShares.of(link_indices(elements), [(i, exit_) for i, _, exit_ in entries])
         numbers = [{state.name: number for number, state in enumerate(element.states)} for element in elements]
-        described = [(i, numbers[i][exit_.asked], exit_.firmness) for i, _, exit_ in given]
+        described = [(i, numbers[i][exit_.asked], exit_.firmness) for i, _, exit_ in entries]
         self.described = np.array(described, int).reshape(-1, 3)
 
     def of(self, states: Sequence[int]) -> np.ndarray:
-        """Which of them (e,) are exits of elements in these states."""
+        """Return which of the exits (e,) belong to elements in these states."""
         return np.asarray(self._states == np.array(states, int)[self.described[:, 0]])
 
     def shares(self, kept: np.ndarray) -> ExitShares:
-        """What the signals of those that are ``kept`` (e,) are sums of."""
-        return self._shares.taken(kept)
+        """Return the shares of the signals of those that are ``kept`` (e,)."""
+        return self._shares.selected(kept)
 
     def firsts(self, kept: np.ndarray) -> np.ndarray:
-        """The first one (c + 1,) of every element among those that are kept, and how many these are."""
+        """Return the index (c + 1,) of the first kept exit of every element; the last entry is their number."""
         return self.described[kept, 0].searchsorted(self._numbers)
 
     def turning(self, kept: np.ndarray) -> list[tuple[int, Exit]]:
-        """Those that a speed may turn, by their numbers among those that are kept."""
+        """Return the kept exits whose requested state depends on a velocity, with their indices among those kept."""
         if not self._turns:
             return []
         numbers = np.cumsum(kept) - 1

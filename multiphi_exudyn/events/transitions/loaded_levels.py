@@ -1,6 +1,6 @@
-"""Loaded levels: those of one model under the loads of a run, and the maps between them.
+"""Loaded levels: the levels of one model under the loads of a run, and the maps between them.
 
-All of it is made when it is asked for, and kept as long as the model's bound allows.
+They are built when first used, and kept as long as the model's bound on memory allows.
 """
 
 from __future__ import annotations
@@ -22,35 +22,34 @@ from multiphi_exudyn.mathematics.search.signal_bounds import power_of_two_above
 
 __all__ = ["LoadedLevels"]
 
-STARTS = 4  # ends of runs for which it is kept what starts are judged by
-TOLD = 16  # of what was told of runs
-FURTHER = 8  # of a level: of two steps of a solver, with what is attached at two places
+STARTS_KEPT = 4  # ends of runs for which the values that judge starts are kept
+WARNINGS_KEPT = 16  # sets of warnings that are kept
+DERIVED_KEPT = 8  # derived values of a level: two step sizes of a solver, attachments at two positions
 
 T = TypeVar("T")
 
 
 @dataclass
-class _Known:
-    """What is kept of a level: ``links`` that hold in it, maps to other levels by their states.
+class _LevelEntry:
+    """A level with the ``links`` that hold in it, and its maps to other levels by their states.
 
-    further: what others make of it, by their keys.
+    further: values derived from the level elsewhere, by their keys.
     """
 
     level: LoadedLevel
     links: tuple[int, ...]
     ways: dict[tuple[int, ...], Transition] = field(default_factory=dict)
-    further: BoundedCache[Hashable, Any] = field(default_factory=lambda: BoundedCache(FURTHER))
+    further: BoundedCache[Hashable, Any] = field(default_factory=lambda: BoundedCache(DERIVED_KEPT))
 
 
 class LoadedLevels:
     """Levels of ``model`` under an excitation, for motions from ``time`` to ``until`` [s]; drive: at ``time``.
 
-    A level goes by the states of all elements, a number each. alone: those under its static loads alone, with held
-    places for channels, which outlast a run; these where nothing varies.
-    lasting: the longest time [s] that a motion takes.
-    arrays: what the loop keeps of them, for later runs (level_arrays.py). held: the same under forces that bodies hold
-    for a step (modal_force.py). starts: what starts are judged by, by the end [s] of their run (simulate.py). told:
-    what is told alike of runs in the same levels (run_warnings.py).
+    The key of a level is the state numbers of all elements. alone: the levels under the static loads alone, with held
+    displacements as channels, which are kept longer than a run; it is these levels if nothing varies. lasting: the
+    longest duration [s] of a motion. arrays: the loop's arrays of these levels, for later runs (level_arrays.py). held:
+    the same under forces that bodies hold for a step (modal_force.py). starts: values by which starts are judged, by
+    the end [s] of their run (simulate.py). told: warnings common to runs in the same levels (run_warnings.py).
     """
 
     def __init__(
@@ -66,12 +65,12 @@ class LoadedLevels:
         self.excitation = excitation
         self.alone = alone or self
         self.lasting = lasting
-        self.set_out(time, until)
+        self.set_interval(time, until)
         self.arrays: Any = None
         self.held: Any = None
-        self.starts = BoundedCache[float, Any](STARTS)
-        self.told = BoundedCache[Hashable, Any](TOLD)
-        self._known = BoundedCache[tuple[int, ...], _Known](model.most_levels, self._close)
+        self.starts = BoundedCache[float, Any](STARTS_KEPT)
+        self.told = BoundedCache[Hashable, Any](WARNINGS_KEPT)
+        self._entries = BoundedCache[tuple[int, ...], _LevelEntry](model.most_levels, self._drop_maps_to)
         self._pushed = BoundedCache[tuple[int, ...], LoadedLevel](model.most_levels)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -79,33 +78,33 @@ class LoadedLevels:
 
     @classmethod
     def static(cls, model: MultiPhiModel, load: np.ndarray, lasting: float = math.inf) -> LoadedLevels:
-        """Levels under a static ``load`` (m,) in base coordinates alone, for motions of a time [s] at most."""
+        """Return levels under a static ``load`` (m,) in base coordinates, for motions of a duration [s] at most."""
         return cls(model, Excitation.constant(load, len(model.links), model.held), lasting=lasting)
 
     @classmethod
     def under(
         cls, model: MultiPhiModel, excitation: Excitation, time: float, end: float, lasting: float = math.inf
     ) -> LoadedLevels:
-        """Levels under an excitation, for motions from a time [s] to an end, each of a time [s] at most.
+        """Return levels under an excitation, for motions from a time [s] to an end, of a duration [s] at most.
 
-        Those under its static loads are kept by the model: the maps between them serve every run.
+        The model keeps those under its static loads: the maps between them serve every run.
         """
-        load, longest = excitation.static, _longest(model, lasting)
+        load, longest = excitation.static, _longest_motion(model, lasting)
         key = load.tobytes(), longest
         alone: LoadedLevels = model.loaded.get_or_build(key, lambda: cls.static(model, load, longest))
         return cls(model, excitation, time, end, alone) if excitation.prescribed else alone
 
-    def set_out(self, time: float, until: float) -> None:
-        """Take another time and end [s] for the motions that follow."""
+    def set_interval(self, time: float, until: float) -> None:
+        """Set the time and end [s] of the motions that follow."""
         self.drive, self.until = self.excitation.drive(time), until
 
     @property
     def kept_arrays(self) -> list[Any]:
-        """Those that are kept, under held forces too."""
+        """The arrays that are kept, including those under held forces."""
         return [arrays for arrays in (self.arrays, getattr(self.held, "arrays", None)) if arrays is not None]
 
     def let_go(self, arrays: Any) -> None:
-        """Keep these arrays no longer; who works on them has them still."""
+        """Stop keeping these arrays; a run that works on them still holds them."""
         if self.arrays is arrays:
             self.arrays = None
         else:
@@ -113,7 +112,7 @@ class LoadedLevels:
 
     @property
     def isolated(self) -> bool:
-        """Whether nothing works on the structure from outside, so that it has no more energy than at its start."""
+        """Whether no load acts on the structure, so that its energy never exceeds that at its start."""
         return self.excitation.nothing and not (self.model.general or self.model.overrides)
 
     @property
@@ -122,47 +121,48 @@ class LoadedLevels:
         return self.excitation.static
 
     def level(self, states: Sequence[int]) -> LoadedLevel:
-        """The level of elements in these states, under the loads and what they push."""
-        known = self._of(tuple(states))
-        self.model.level_at(known.links)  # of the levels that the model keeps it is now the one used last
-        return known.level
+        """Return the level of elements in these states, under the loads and the constant forces of elements."""
+        entry = self._entry(tuple(states))
+        self.model.level_at(entry.links)  # marks it as used last among those that the model keeps
+        return entry.level
 
     def further(self, states: tuple[int, ...], key: Hashable, make: Callable[[], T]) -> T:
-        """What others make of a level, by a key of theirs that says all it depends on; kept with the level."""
-        made: T = self._of(states).further.get_or_build(key, make)
-        return made
+        """Return a value derived from a level, by a key of all it depends on; made once, kept with the level."""
+        value: T = self._entry(states).further.get_or_build(key, make)
+        return value
 
     def forget(self, links: tuple[int, ...]) -> None:
-        """Let go of what is kept of the levels in which these links hold."""
-        for states in [states for states, known in self._known.items() if known.links == links]:
-            self._known.drop(states)
+        """Drop what is kept of the levels in which these links hold."""
+        for states in [states for states, entry in self._entries.items() if entry.links == links]:
+            self._entries.drop(states)
         for states in [states for states, level in self._pushed.items() if level.level.indices == links]:
             self._pushed.drop(states)
 
-    def _of(self, states: tuple[int, ...]) -> _Known:
-        return self._known.get_or_build(states, lambda: self._loaded(states))
+    def _entry(self, states: tuple[int, ...]) -> _LevelEntry:
+        return self._entries.get_or_build(states, lambda: self._build_entry(states))
 
-    def _loaded(self, states: tuple[int, ...]) -> _Known:
+    def _build_entry(self, states: tuple[int, ...]) -> _LevelEntry:
         level = self.alone.pushed(states)
         links = level.level.indices
         under = self.alone is not self or self.model.general
-        return _Known(level.under(self.excitation) if under else level, links)
+        return _LevelEntry(level.under(self.excitation) if under else level, links)
 
     def pushed(self, states: tuple[int, ...]) -> LoadedLevel:
-        """The level under the static loads and what elements push, without any channel; kept for all excitations.
+        """Return the level under the static loads and constant forces of elements, without varying channels.
 
-        What elements push is among its loads, and not among those of a level with channels.
+        It is kept for all excitations. The forces of elements are among its loads, but not among those of a level with
+        channels.
         """
-        return self._pushed.get_or_build(states, lambda: self._made(states))
+        return self._pushed.get_or_build(states, lambda: self._build_static(states))
 
-    def _made(self, states: tuple[int, ...]) -> LoadedLevel:
+    def _build_static(self, states: tuple[int, ...]) -> LoadedLevel:
         level = self.model.level_at(self.model.active_links(states))
         if self.model.general:
             return LoadedLevel.of(level, self.load + self.model.push(states), states, lasting=self.lasting)
         return LoadedLevel.of(level, self.load, states, self.excitation, self.lasting)
 
     def with_channels(self, state: State) -> State:
-        """A state under the static loads alone as one of these levels, at the time at which they set out."""
+        """Return a state under the static loads alone as a state of these levels, at the start of their interval."""
         level, r = self.level(state.level.states), state.level.modal.modes
         w, w_t, _ = self.drive.values
         x, v = state.displacement, state.velocity
@@ -170,38 +170,38 @@ class LoadedLevels:
         return State(level, xi, xi_t, state.phases)
 
     def without_channels(self, state: State) -> State:
-        """eta, the held places, and their rates alone, in the level under static loads alone."""
+        """Return eta, the held displacements and their rates alone, in the level under static loads alone."""
         r, places = state.level.modal.modes, self.excitation.prescribed
         x, v = (np.delete(xi, slice(r, r + places)) for xi in (state.displacement, state.velocity))
         return State(self.alone.level(state.level.states), x, v, state.phases)
 
-    def _close(self, states: tuple[int, ...], gone: _Known) -> None:
-        """The ways to a level that is not kept any more."""
-        for _, known in self._known.items():
-            known.ways.pop(states, None)
+    def _drop_maps_to(self, states: tuple[int, ...], gone: _LevelEntry) -> None:
+        """Drop the maps to a level that is not kept any more."""
+        for _, entry in self._entries.items():
+            entry.ways.pop(states, None)
 
     @property
     def levels_kept(self) -> int:
-        """Number of levels of which something is kept."""
-        return len(self._known)
+        """Number of levels that are kept."""
+        return len(self._entries)
 
     @property
     def ways(self) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-        """From and to which levels, by their states, maps are kept."""
-        return [(source, target) for source, known in self._known.items() for target in known.ways]
+        """Pairs of levels, by their states, between which maps are kept."""
+        return [(source, target) for source, entry in self._entries.items() for target in entry.ways]
 
     def transition(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
-        """The map between two levels, computed once as long as they are kept."""
-        ways = self._of(source.states).ways
+        """Return the map between two levels, computed once as long as they are kept."""
+        ways = self._entry(source.states).ways
         if target.states not in ways:
             ways[target.states] = Transition(source, target)
         return ways[target.states]
 
 
-def _longest(model: MultiPhiModel, lasting: float) -> float:
-    """A power of two [s] above a time, at which motions of that time are looked at; infinite where it does not count.
+def _longest_motion(model: MultiPhiModel, lasting: float) -> float:
+    """Return a power of two [s] above a duration, for motions of that duration at most; infinite if it does not matter.
 
-    It counts where the structure, or an element, may damp zero-frequency modes.
+    It matters if the structure, or an element, may damp zero-frequency modes.
     """
     base = model.base
     rigid = base.modes.rigid

@@ -1,4 +1,4 @@
-"""State of the reduced model at an instant, the events that change it, and the functions they are read from."""
+"""State of the reduced model at an instant, the events that change it, and the linear functions of it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class State(Shown):
 
     @functools.cached_property
     def held(self) -> np.ndarray:
-        """The places (h,) that links hold [m]."""
+        """Displacements (h,) [m] that links hold."""
         return self.displacement[self.level.modal.modes + self.level.excitation.prescribed :]
 
     @functools.cached_property
@@ -63,17 +63,17 @@ class State(Shown):
 
     @functools.cached_property
     def reach(self) -> np.ndarray:
-        """How far (r + q,) the velocities carry the modes: |eta'| / omega, zero where nothing oscillates."""
+        """Displacements (r + q,) that the velocities lead to: |eta'| / omega, zero on zero-frequency modes."""
         omega = self.level.level.omega
         return np.divide(np.abs(self.velocity), omega, out=np.zeros(len(omega)), where=omega > 0)
 
 
 class Loss(NamedTuple):
-    """Energy [J] that left the model at an event: plastic impact, and what truncated bases dropped.
+    """Energies [J] that left the model at an event: by plastic impact, and by truncated bases.
 
-    stop_work: what moving stops, or what hangs on its points in Exudyn, put into it by impulses, no loss. damping: the
-    strain of viscous contacts that change inside their stop (contact.py). friction: of springs that begin to slip, what
-    they held more than they keep (friction.py).
+    stop_work: put in by impulses of moving stops, or of bodies attached in Exudyn; no loss. damping: of the springs of
+    viscous contacts that change inside their stop (contact.py). friction: of springs that begin to slip, by the drop of
+    their force (friction.py).
     """
 
     impact: float = 0.0
@@ -147,9 +147,9 @@ class Event:
 
 
 def event_table(events: Sequence[Event], index: Callable[[str], int]) -> np.ndarray:
-    """Time [s], position of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4).
+    """Return time [s], index of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4).
 
-    Some events are kept in arrays (time/recorded.py).
+    Some events are kept in arrays (recorded_segments.py).
     """
     kept = getattr(events, "table", None)
     if kept is not None:
@@ -159,13 +159,13 @@ def event_table(events: Sequence[Event], index: Callable[[str], int]) -> np.ndar
 
 
 def total_loss(events: Sequence[Event]) -> Loss:
-    """The energies that left at all events, some of which are kept in arrays (time/recorded.py)."""
+    """Return the sum of the losses of all events, some of which are kept in arrays (recorded_segments.py)."""
     kept = getattr(events, "loss", None)
     return sum((event.loss for event in events), Loss()) if kept is None else kept
 
 
 def total_impulse(events: Sequence[Event], contact: str, first: float, last: float) -> float:
-    """What a contact was struck with [N s] in [first, last] [s]; some events are kept in arrays (time/recorded.py)."""
+    """Return the impulse [N s] on a contact in [first, last] [s]; some events are kept in arrays."""
     kept = getattr(events, "impulse", None)
     if kept is not None:
         return float(kept(contact, first, last))
@@ -183,7 +183,7 @@ class Row:
     constant: float
 
     def sign(self, displacement: np.ndarray, velocity: np.ndarray, reach: np.ndarray) -> int:
-        """Sign of the value, zero where it is round-off of its terms; reach: displacements (r,) of the motion.
+        """Return the sign of the value, zero if it is round-off of its terms; reach: displacements (r,) of the motion.
 
         At the root of a signal all displacements may be round-off of what they were before.
         """

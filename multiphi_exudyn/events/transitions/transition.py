@@ -34,8 +34,8 @@ from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, en
 
 __all__ = ["Transition", "modal_projection"]
 
-UNMIXED = 1e-13  # product of two modes, of unit length in either energy, below which they have no part in each other
-PRODUCT = 1e-15  # round-off of such a product alone: smaller ones are zero whatever they count in strain energy
+UNMIXED = 1e-13  # product of two modes, of unit length in either energy, below which they are orthogonal
+PRODUCT = 1e-15  # round-off of such a product alone: smaller ones are zero even if they count in strain energy
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Transition:
         """T = [[Psi_m^T Psi_l, Psi_m^T (R_l - R_m)], [0, 1]], where no place is set."""
         if not self.source.excitation.channels:
             return modal_projection(self.target.modal, self.source.modal)
-        whole, (rows, _) = self._map(self.source.channels.shapes, self._shapes), self._set
+        whole, (rows, _) = self._map(self.source.channels.shapes, self._shapes), self._set_channels
         whole[: self._modes] -= self.target.modal.vectors.T @ self._shapes @ rows
         whole[self._modes :] += rows
         return whole
@@ -68,18 +68,19 @@ class Transition:
         jump = self.source.asymptotic.configuration - self.target.asymptotic.configuration
         if not self.source.excitation.channels:
             return np.asarray(self.target.modal.vectors.T @ jump)
-        _, constants = self._set
+        _, constants = self._set_channels
         return np.concatenate([self.target.modal.vectors.T @ (jump - self._shapes @ constants), constants])
 
     @property
     def terms(self) -> np.ndarray | None:
-        """Of which terms T and c are the sums, where links have held places: what a mode has of a slow motion cancels.
+        """Sums of the absolute terms of T and c, None if no link holds a displacement.
 
-        That is what a stiff link keeps of its stretch, and what the first accelerations of a slip are made of.
+        They are larger than T and c where a slow part of a stiff mode cancels. That part is what a stiff link keeps of
+        its stretch, and what the first accelerations of a slip consist of.
         """
         if self.source.excitation.channels == self.source.excitation.prescribed:
             return None
-        rows, constants = np.abs(self._set[0]), np.abs(self._set[1])
+        rows, constants = np.abs(self._set_channels[0]), np.abs(self._set_channels[1])
         source, r = self.source, self.source.modal.modes
         ends = np.abs(source.asymptotic.configuration) + np.abs(self.target.asymptotic.configuration)
         moved = np.column_stack([np.abs(source.level.vectors), ends])
@@ -98,8 +99,8 @@ class Transition:
         return self.target.modal.modes
 
     @functools.cached_property
-    def _set(self) -> tuple[np.ndarray, np.ndarray]:
-        """What is added to w: (q, r_l + q) times xi_l, and (q,): the excess of q over the stretch it is to have."""
+    def _set_channels(self) -> tuple[np.ndarray, np.ndarray]:
+        """Additions to w: (q, r_l + q) times xi_l, and (q,): the excess of q over the stretch it is to have."""
         source, excitation = self.source, self.source.excitation
         rows, constants = np.zeros((excitation.channels, len(source.level.squares))), np.zeros(excitation.channels)
         base = source.level.base
@@ -117,10 +118,10 @@ class Transition:
 
     def _map(self, source: np.ndarray, target: np.ndarray) -> np.ndarray:
         """[[Psi_m^T Psi_l, Psi_m^T (source - target)], [0, 1]]; source, target: (m, q)."""
-        own, before, q = self.target.modal, self.source.modal, source.shape[1]
-        mapped = np.eye(own.modes + q, before.modes + q, before.modes - own.modes)
-        mapped[: own.modes, : before.modes] = modal_projection(own, before)
-        mapped[: own.modes, before.modes :] = own.vectors.T @ (source - target)
+        target_level, source_level, q = self.target.modal, self.source.modal, source.shape[1]
+        mapped = np.eye(target_level.modes + q, source_level.modes + q, source_level.modes - target_level.modes)
+        mapped[: target_level.modes, : source_level.modes] = modal_projection(target_level, source_level)
+        mapped[: target_level.modes, source_level.modes :] = target_level.vectors.T @ (source - target)
         return mapped
 
     def displacement(self, xi: np.ndarray) -> np.ndarray:
@@ -133,11 +134,12 @@ class Transition:
 
 
 def modal_projection(target: Level, source: Level) -> np.ndarray:
-    """T = Phi_m^T M Phi_l (r_m, r_l), zero where a product is round-off of its modes' lengths in both energies.
+    """Return T = Phi_m^T M Phi_l (r_m, r_l), zero where a product is round-off of its modes' lengths in both energies.
 
-    In its place it would give a contact at rest, which no other mode moves, a speed. Kinetic energy is a sum of eta'^2,
-    strain energy one of (omega eta)^2: there the length of T_ij is |T_ij| omega_i / omega_j, so what a stiff mode has
-    of a soft one may be small and count. The modes' own round-off, larger where there are many, is not seen here.
+    Such a product would give a contact at rest, which no other mode moves, a velocity. The kinetic energy is a sum of
+    eta'^2, the strain energy one of (omega eta)^2: there the length of T_ij is |T_ij| omega_i / omega_j, so a small
+    share that a stiff mode has in a soft one may count. The modes' own round-off, larger if there are many, is not
+    considered.
     """
     products: np.ndarray = target.vectors.T @ source.vectors
     clear_unmixed(products.ravel(), target.omega, source.omega, *products.shape)
@@ -146,7 +148,7 @@ def modal_projection(target: Level, source: Level) -> np.ndarray:
 
 @compiled
 def clear(products: Numbers, omega: Numbers, source: Numbers, rows: int, columns: int) -> None:
-    """Products (rows, columns) of modes with these omega become zero where they are round-off in both energies."""
+    """Set products (rows, columns) of modes with these omega to zero if they are round-off in both energies."""
     for i in range(rows):
         for j in range(columns):
             share, k = source[j] / omega[i] if omega[i] > source[j] else 1.0, i * columns + j

@@ -1,16 +1,16 @@
-"""Primitives of the powers in a level: forms whose changes over a segment are its works (time/work_sums.py).
+"""Primitives of the powers in a level: forms whose changes over a segment are the works in it (time/loop/work_sums.py).
 
 y = (eta, eta') of the free response, y' = A y, and a (N,) the coefficients of the channels' carriers at an instant,
 
     w(t + s) = Re sum_j exp(mu_j s) sum_d a_jd s^d,   a' = M a
 
-(M a)_jd = mu_j a_jd + (d + 1) a_j,d+1. What channels force is Re G a, with G M = A G + B. A power of both,
+(M a)_jd = mu_j a_jd + (d + 1) a_j,d+1. The forced response is Re G a, with G M = A G + B. A power of both,
 
     Re(a.W y) + Re(a.Q a + a.Q~ conj(a)) / 2,   is d/dt of   Re(a.R y) + Re(a.P a + a.P~ conj(a)) / 2
     M^T R + R A = W,   M^T P + P M = Q,   M^T P~ + P~ conj(M) = Q~
 
-row by row of R, element by element of P; where two rates cancel each other, products of their a are polynomials of
-time, which Gauss-Legendre quadrature integrates exactly.
+is solved row by row for R, and element by element for P. If two rates cancel each other, the products of their a are
+polynomials of time, which Gauss-Legendre quadrature integrates exactly.
 """
 
 from __future__ import annotations
@@ -26,17 +26,18 @@ from multiphi_exudyn.mathematics.compiling.compiled import Numbers, Waves, compi
 
 __all__ = ["MOST_COEFFICIENTS", "DrivenForms", "driven_forms", "primitive", "swings"]
 
-LARGEST_PRIMITIVE = 1e3  # of the speeds in it, squared: what energies are made of is of their size; more is round-off
-MOST_COEFFICIENTS = 16  # N, of more it is not worth while
+LARGEST_PRIMITIVE = 1e3  # times the squared velocities: energies are of the size of these; larger ones are round-off
+MOST_COEFFICIENTS = 16  # N: with more, quadrature is faster
 NEARLY_CANCELLED = 1e-6  # of two rates: their sum, unless it is zero; primitives would be large differences
 
 
 @dataclass(frozen=True)
 class DrivenForms:
-    """Real forms in u = (b, y), (s,), b (k,) of each carrier Re a, and Im a where its rate is not real.
+    """Real forms in u = (b, y), (s,); b (k,) holds Re a of each carrier, and Im a if its rate is not real.
 
-    carriers: powers (D + 1) of time by their rates. response: G (2 r, k). Of damping and of what varies changing: rows
-    b of the primitives (k, s); lasting: powers without one (k, k). nodes, weights: on [0, 1], for these.
+    carriers: powers (D + 1) of time by their rates. response: G (2 r, k). changing: rows b of the primitives (k, s), of
+    the powers of damping and of varying loads. lasting: powers without a primitive (k, k). nodes, weights: on [0, 1],
+    for these.
     """
 
     carriers: Mapping[complex, int]
@@ -48,15 +49,16 @@ class DrivenForms:
 
 
 def primitive(level: LoadedLevel, damping: np.ndarray) -> np.ndarray | None:
-    """F (2 r, 2 r), symmetric: y.F y grows by the work of damping in a free response; None where it has powers of time.
+    """Return F (2 r, 2 r), symmetric: y.F y grows by the work of damping in a free response.
 
-    damping: D, symmetric, (r, r) or more. Of z = c exp(lambda t) (p,), with the speeds S = V Lambda, eta' = Re S z,
+    None if the response has powers of time. damping: D, symmetric, (r, r) or more. Of z = c exp(lambda t) (p,), with
+    the velocities S = V Lambda, eta' = Re S z,
 
         eta'.D eta' = 1/2 Re (z.S^T D S z + z.S^T D conj(S z)) = d/dt 1/2 Re (z.A z + z.B conj(z))
 
-    and A, B are S^T D S and S^T D conj(S) over the sums lambda_j + lambda_k and lambda_j + conj(lambda_k). Of a motion
-    that nothing damps B is one round-off over another: what is not symmetric in F is that alone, and is taken out, for
-    y.F y changes by (y_1 + y_0).F (y_1 - y_0) of a symmetric F only.
+    and A, B are S^T D S and S^T D conj(S) over the sums lambda_j + lambda_k and lambda_j + conj(lambda_k). In an
+    undamped motion B is one round-off divided by another. The asymmetric part of F consists of that alone, and is
+    removed, as y.F y changes by (y_1 + y_0).F (y_1 - y_0) only for a symmetric F.
     """
     response, r, p = level.response, level.modal.modes, len(level.response.basis.rates)
     if not response.basis.pure:
@@ -75,7 +77,10 @@ def primitive(level: LoadedLevel, damping: np.ndarray) -> np.ndarray | None:
 
 @compiled
 def unfold(numbers: Numbers, waves: Waves, r: int, p: int) -> None:
-    """S^T, A, B (p, 3 r), real parts, then imaginary ones; |S_j|^2 (p,) last. waves: lambda (p,), V^T, A, B (p, r)."""
+    """Write S^T, A, B (p, 3 r), real parts, then imaginary ones, and |S_j|^2 (p,).
+
+    waves: lambda (p,), V^T, A, B (p, r).
+    """
     for j in range(p):
         real, imaginary, size = 3 * r * j, 3 * r * (p + j), 0.0
         for i in range(r):
@@ -91,9 +96,9 @@ def unfold(numbers: Numbers, waves: Waves, r: int, p: int) -> None:
 
 @compiled
 def integrate(numbers: Numbers, waves: Waves, r: int, p: int) -> int:
-    """Of the power of speeds, [Re S, Im S]^T D [Re S, Im S], makes its primitive in (Re z, Im z), (2 p, 2 p).
+    """Replace the power [Re S, Im S]^T D [Re S, Im S] by its primitive in (Re z, Im z), (2 p, 2 p).
 
-    0 where that is much larger than the speeds.
+    Return 0 if the primitive is much larger than the velocities, else 1.
     """
     sizes = (6 * r + 4 * p) * p
     for j in range(p):
@@ -120,9 +125,9 @@ unfold_response, integrate_power = entry(unfold), entry(integrate)
 
 
 def swings(level: LoadedLevel, varying: np.ndarray) -> np.ndarray:
-    """Of each exponential of the free response, without powers of time (p, r + 2 q): eta', and what works on w and w'.
+    """Return (p, r + 2 q) for each exponential of the free response: eta', and the forces that work on w and w'.
 
-    varying: the power of what varies (``powers``).
+    varying: the power of varying loads (``powers``). The response must have no powers of time.
     """
     response, r, n = level.response, level.modal.modes, level.level.modes
     speeds = response.shapes * response.basis.rates
@@ -134,9 +139,9 @@ def swings(level: LoadedLevel, varying: np.ndarray) -> np.ndarray:
 def driven_forms(
     level: LoadedLevel, damping: np.ndarray, varying: np.ndarray, carriers: Mapping[complex, int]
 ) -> DrivenForms | None:
-    """The forms of a level without powers of time, damping (n, n) and varying (q, 4 n + 1) as ``powers`` has them.
+    """Return the forms of a level, damping (n, n) and varying (q, 4 n + 1) as ``powers`` has them.
 
-    None where a carrier meets a pole, or there are too many.
+    None if a carrier meets a pole, or if there are too many carriers.
     """
     q, r, n = level.excitation.prescribed, level.modal.modes, level.level.modes
     if not 0 < sum(carriers.values()) * q <= MOST_COEFFICIENTS:
@@ -176,7 +181,7 @@ def driven_forms(
 
 
 class _Chains:
-    """The a (N,) of carriers with their powers, of q channels: carrier by carrier, power by power."""
+    """Coefficients a (N,) of carriers with their powers of time, of q channels: carrier by carrier, power by power."""
 
     def __init__(self, carriers: Mapping[complex, int], q: int) -> None:
         self._q, self._carriers = q, carriers
@@ -192,7 +197,7 @@ class _Chains:
 
     @property
     def kept(self) -> list[int]:
-        """Which of (Re a, Im a) are in b, in their order there."""
+        """Indices of those of (Re a, Im a) that are in b, in their order there."""
         kept, first = list[int](), 0
         for rate, count in self._carriers.items():
             own = range(first, first + count * self._q)
@@ -204,46 +209,46 @@ class _Chains:
         return slice(k * self._q, (k + 1) * self._q)
 
     def response(self, level: LoadedLevel, stiffness: np.ndarray, damped: np.ndarray) -> np.ndarray:
-        """The upper half (r, N) of G: eta'' + D eta' + S eta = P w + Q w'."""
+        """Return the upper half (r, N) of G: eta'' + D eta' + S eta = P w + Q w'."""
         r, channels = len(stiffness), level.channels
         drives = self.values @ self.motion
         pushes = channels.force[:, : self._q] @ self.values + channels.force_rate[:, : self._q] @ drives
-        found = np.zeros((r, self.count), complex)
+        result = np.zeros((r, self.count), complex)
         for k, (rate, d) in enumerate(self._terms):
-            given = pushes[:, self._columns(k)]
+            force = pushes[:, self._columns(k)]
             if d:
-                given = given - d * (2 * rate * np.eye(r) + damped) @ found[:, self._columns(k - 1)]
+                force = force - d * (2 * rate * np.eye(r) + damped) @ result[:, self._columns(k - 1)]
             if d > 1:
-                given = given - d * (d - 1) * found[:, self._columns(k - 2)]
-            found[:, self._columns(k)] = np.linalg.solve(_dynamic(rate, stiffness, damped), given)
-        return found
+                force = force - d * (d - 1) * result[:, self._columns(k - 2)]
+            result[:, self._columns(k)] = np.linalg.solve(_dynamic(rate, stiffness, damped), force)
+        return result
 
     def crossed(
         self, on_place: np.ndarray, on_speed: np.ndarray, stiffness: np.ndarray, damped: np.ndarray
     ) -> np.ndarray:
-        """R (N, 2 r) of W = (on_place, on_speed)."""
+        """Return R (N, 2 r) of W = (on_place, on_speed)."""
         r = len(stiffness)
-        found = np.zeros((self.count, 2 * r), complex)
+        result = np.zeros((self.count, 2 * r), complex)
         for k, (rate, d) in enumerate(self._terms):
             own = self._columns(k)
             place, speed = on_place[own], on_speed[own]
             if d:
-                before = d * found[self._columns(k - 1)]
+                before = d * result[self._columns(k - 1)]
                 place, speed = place - before[:, :r], speed - before[:, r:]
             turned = np.linalg.solve(_dynamic(-rate, stiffness, damped).T, (rate * speed - place).T).T
-            found[own, r:] = turned
-            found[own, :r] = speed - turned @ (rate * np.eye(r) - damped)
-        return found
+            result[own, r:] = turned
+            result[own, :r] = speed - turned @ (rate * np.eye(r) - damped)
+        return result
 
     def squared(self, one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of the power Re(one a).Re(other a), (k, N) each: its primitive in (Re a, Im a), and what of it has none."""
-        found, rest = self._primitive(one.T @ other, np.asarray)
+        """Return the primitive in (Re a, Im a) of Re(one a).Re(other a), (k, N) each, and the part without one."""
+        result, rest = self._primitive(one.T @ other, np.asarray)
         mirrored, further = self._primitive(one.T @ other.conj(), np.conj)
-        return _real(found, mirrored), _real(rest, further)
+        return _real(result, mirrored), _real(rest, further)
 
     def _primitive(self, power: np.ndarray, turned: Callable[[complex], Any]) -> tuple[np.ndarray, np.ndarray]:
-        """P (N, N) of Q, the rates of its second index ``turned``, and what of Q has none."""
-        found, rest = np.zeros_like(power), np.zeros_like(power)
+        """Return P (N, N) of Q, the rates of its second index ``turned``, and the part of Q that has no primitive."""
+        result, rest = np.zeros_like(power), np.zeros_like(power)
         for k, (rate, d) in enumerate(self._terms):
             for j, (other, e) in enumerate(self._terms):
                 rows, columns, total = self._columns(k), self._columns(j), complex(rate + turned(other))
@@ -252,22 +257,22 @@ class _Chains:
                     continue
                 if abs(total) < NEARLY_CANCELLED * (abs(rate) + abs(other)):
                     raise np.linalg.LinAlgError("rates that nearly cancel")
-                given = power[rows, columns]
+                form = power[rows, columns]
                 if d:
-                    given = given - d * found[self._columns(k - 1), columns]
+                    form = form - d * result[self._columns(k - 1), columns]
                 if e:
-                    given = given - e * found[rows, self._columns(j - 1)]
-                found[rows, columns] = given / total
-        return found, rest
+                    form = form - e * result[rows, self._columns(j - 1)]
+                result[rows, columns] = form / total
+        return result, rest
 
 
 def _dynamic(rate: complex, stiffness: np.ndarray, damped: np.ndarray) -> np.ndarray:
-    """rate^2 + D rate + S."""
+    """Return rate^2 + D rate + S."""
     return np.asarray(rate * (rate * np.eye(len(stiffness)) + damped) + stiffness)
 
 
 def _real(power: np.ndarray, conjugated: np.ndarray) -> np.ndarray:
-    """The form of Re(a.P a + a.P~ conj(a)) / 2 in (Re a, Im a)."""
+    """Return the form of Re(a.P a + a.P~ conj(a)) / 2 in (Re a, Im a)."""
     upper = np.hstack([power.real + conjugated.real, conjugated.imag - power.imag])
     lower = np.hstack([-power.imag - conjugated.imag, conjugated.real - power.real])
     return 0.5 * np.vstack([upper, lower])
