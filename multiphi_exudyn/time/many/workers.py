@@ -67,10 +67,10 @@ class Task:
             self._finish(numbers[0], self._run(numbers[0], None))
             bar.update()
         with ThreadPoolExecutor(threads) as pool:
-            working = [pool.submit(self._work, threads, bar) for _ in range(threads)]
+            futures = [pool.submit(self._work, threads, bar) for _ in range(threads)]
             try:
-                for each in working:
-                    each.result()
+                for future in futures:
+                    future.result()
             finally:
                 self._stopped = True
 

@@ -74,7 +74,7 @@ class _RigidFriction(NamedTuple):
     compliant: bool  # whether its contact is
 
     def turns(self, before: Sequence[int], after: Sequence[int]) -> bool:
-        """Whether it slips in the level that is before, and slips the other way or sticks in the one that is after."""
+        """Whether it slips before a transition, and slips the other way or sticks after it."""
         return before[self.element] > self.sticks <= after[self.element] != before[self.element]
 
     def breaks_away(self, before: Sequence[int], after: Sequence[int]) -> bool:

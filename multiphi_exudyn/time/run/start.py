@@ -26,7 +26,7 @@ from multiphi_exudyn.time.run.start_projection import StartProjection
 __all__ = ["first_start"]
 
 TOUCHING = 1e-9  # of the gap and of the terms of it: a smaller gap touches
-UNSEEN = 1e-12  # of the possible size of the motion: a smaller gap is round-off of a run that is continued
+CONTINUED = 1e-12  # of the possible size of the motion: a smaller gap is round-off at the start of a continued run
 NO_PLACES = np.zeros(0)  # held places of a start without friction
 
 
@@ -61,7 +61,7 @@ class _Scales:
         lengths = float(np.linalg.norm(excitation.largest_load * times**2)) + others
         stop_positions, speeds = map(excitation.moved, levels.drive.values[:2])
         apart = None if model.general or model.force_laws else (OPEN,) * len(model.contacts)
-        near = TOUCHING * gap_terms + UNSEEN * lengths * sizes
+        near = TOUCHING * gap_terms + CONTINUED * lengths * sizes
         stops, projection = base.gaps - stop_positions, None
         if base.complete:  # the terms of h.y are no more than |h| |y|
             lengths = np.where(sizes > 0, sizes, 1.0)
@@ -70,7 +70,7 @@ class _Scales:
 
     def near(self, terms: np.ndarray, length: float) -> np.ndarray:
         """Gaps (l,) [m] below which a contact touches: by the terms (l,) of h.y and by the size of the motion."""
-        return TOUCHING * terms + (UNSEEN * length) * self.sizes + self.touching
+        return TOUCHING * terms + (CONTINUED * length) * self.sizes + self.touching
 
 
 def first_start(

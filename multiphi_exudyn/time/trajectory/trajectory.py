@@ -73,7 +73,7 @@ class Trajectory(ModelHistories):
         colon: truncated contact, truncated friction, lost energy, truncation, undamped modes, damping ratios, missing
         modes, linear range, cluster, base, load pieces.
     again : callable
-        The same run from other y, y' (m,), without warnings.
+        Function that repeats the run from other y, y' (m,), without warnings.
 
     Examples
     --------
