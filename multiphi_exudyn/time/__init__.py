@@ -1,9 +1,9 @@
-"""Time: runs from event to event, and the trajectories they leave; there is no time step.
+"""Time: runs from event to event, and their trajectories; there is no time step.
 
 A motion advances a state, segment by segment, in the loop on flat arrays, compiled or plain, under loads that are
-constant or vary in time. A record keeps what the loop has done; a trajectory samples it and sums its works, as far as
-the loop has not, by the loop's own flow. What its truncated modes could not hold, and what to distrust in it, is read
-off it.
+constant or vary in time. A record keeps the segments and events of the loop; a trajectory samples them, and sums the
+works that the loop has left out, with the flow of the loop. The effect of truncation and the warnings of a run are
+computed from its trajectory.
 
 Order: warnings, loop, segments, record, trajectory, reliability, run, simulate, many.
 """

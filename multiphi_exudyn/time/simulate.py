@@ -1,7 +1,7 @@
 """Simulation: exact modal motion from event to event (eqs. 38.3, 38.6). There is no time step.
 
-The loop (loop.py) carries the start from event to event. What comes out is a Trajectory of analytic segments. A failure
-on the way ends the trajectory early, with a status and its cause.
+The loop (loop.py) advances the start from event to event. The result is a Trajectory of analytic segments. A failure
+ends the trajectory early, with a status and its cause.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from multiphi_exudyn.mathematics.compiling.compiled import available
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.loads import Load, patterns, unchanging
 from multiphi_exudyn.time.reliability.run_warnings import warnings_of
-from multiphi_exudyn.time.reliability.truncation import adapted
-from multiphi_exudyn.time.run.continuation import going_on, nudged
+from multiphi_exudyn.time.reliability.truncation import run_with_enough_modes
+from multiphi_exudyn.time.run.continuation import continued_start, with_final_velocity
 from multiphi_exudyn.time.run.motion import Motion, motion_of
 from multiphi_exudyn.time.run.refinement import to_tolerance
 from multiphi_exudyn.time.run.start import first_start
@@ -35,13 +35,13 @@ from multiphi_exudyn.time.warnings.warning_groups import issue
 
 __all__ = [
     "Run",
-    "Shared",
+    "SharedResources",
     "checked_end",
     "holding",
     "outside_of",
+    "run_with_warnings",
     "simulate",
     "started",
-    "warned",
 ]
 
 
@@ -76,11 +76,11 @@ def simulate(
         False runs the loop as plain Python; True the compiled one; None the compiled one, and plain Python where numba
         is not installed. The answer is the same to round-off.
     start : Trajectory or Equilibrium, default None
-        A trajectory of the same model: its final state is handed on whole, what friction holds and what contacts wait
-        for included, so that a truncated model too moves as it would have without the break. Time and the time of the
-        loads go on from its t_end; the loads are not part of it: give them again, or others, which then begin with a
-        jump. Or a ``MultiPhiModel.equilibrium``: at rest there, with the springs of friction stretched; its forces are
-        not part of it.
+        A trajectory of the same model: the run continues from its complete final state, held places of friction and
+        phases of contacts included, so that a truncated model too moves as it would have without the break. Time and
+        the time of the loads go on from its t_end; the loads are not part of it: give them again, or others, which then
+        begin with a jump. Or a ``MultiPhiModel.equilibrium``: the run starts at rest there, with the springs of
+        friction stretched; its forces are not part of it.
 
     Returns
     -------
@@ -118,31 +118,32 @@ def simulate(
     if compiled is not None and not isinstance(compiled, bool):
         raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")
     end = checked_end(model, t_end)
-    trajectory = warned(Run(holding(model, loads, start), end, displacement, velocity, loads, compiled, start))
+    run = Run(holding(model, loads, start), end, displacement, velocity, loads, compiled, start)
+    trajectory = run_with_warnings(run)
     issue(trajectory.warnings)
     return trajectory
 
 
 def checked_end(model: MultiPhiModel, t_end: float) -> float:
-    """t_end [s] of runs of a model, if both can be."""
+    """Check a model and the end [s] of its run, and return the end."""
     if not isinstance(model, MultiPhiModel):
         raise MultiPhiTypeError(f"model: got {type(model).__name__}, need a MultiPhiModel")
     return _time("t_end", t_end)
 
 
-def warned(given: Run) -> Trajectory:
-    """The answer with its warnings, none of them issued."""
-    run, modes = started(given), given.model.modes
+def run_with_warnings(run: Run) -> Trajectory:
+    """Trajectory of a run with its warnings, none of them issued."""
+    modes, run = run.model.modes, started(run)
     trajectory = run.trajectory()
-    outside = outside_of(run, trajectory.model)
-    found = (*warnings_of(trajectory, modes if isinstance(modes, Tolerance) else None), *outside)
-    if found:
-        object.__setattr__(trajectory, "warnings", found)  # nobody has seen it without them
+    of_base = outside_of(run, trajectory.model)
+    sentences = (*warnings_of(trajectory, modes if isinstance(modes, Tolerance) else None), *of_base)
+    if sentences:
+        object.__setattr__(trajectory, "warnings", sentences)  # it is new: no other reference to it exists
     return trajectory
 
 
 def outside_of(run: Run, model: MultiPhiModel, rows: Sequence[np.ndarray] = ()) -> tuple[str, ...]:
-    """What a base leaves out of a run, and of further places (k, n) at which something acts, a sentence each."""
+    """Sentences on what a base leaves out of a run and of further rows (k, n) on which forces act."""
     if model.base.complete:
         return ()
     acting = np.vstack([patterns(model.structure, run.loads), *rows])
@@ -155,9 +156,9 @@ def holding(
     start: Trajectory | Equilibrium | None = None,
     rows: Sequence[np.ndarray] = (),
 ) -> MultiPhiModel:
-    """The model whose base holds what the loads act on; a run that goes on keeps that of its start.
+    """Model whose base includes the rows on which the loads act; a continued run keeps the base of its start.
 
-    rows: (k, n) of further places at which something acts.
+    rows: (k, n) of further places at which forces act.
     """
     if start is not None and isinstance(start, Trajectory):
         return start.model if model.widened_to(start.model) else model
@@ -166,22 +167,22 @@ def holding(
     return model.holding(np.vstack([patterns(model.structure, loads), *rows]))
 
 
-class Shared(Protocol):
-    """What many runs of one model under the same loads have in common (many.py)."""
+class SharedResources(Protocol):
+    """Levels and arrays that many runs of one model under the same loads share (many.py)."""
 
-    def levels(self, key: object, made: Callable[[], LoadedLevels]) -> LoadedLevels:
-        """The levels under the loads, made once."""
+    def levels(self, key: object, build: Callable[[], LoadedLevels]) -> LoadedLevels:
+        """Return the levels under the loads, build once."""
 
     def motion(self, levels: LoadedLevels, start: Start, compiled: bool | None) -> Motion:
-        """A run in these levels on arrays that no other run has at that time."""
+        """Return a motion in these levels, on arrays that no other run uses at the same time."""
 
 
 @dataclass
 class Run:
-    """What ``simulate`` is asked for, there is more about it there; t_end [s].
+    """Arguments of ``simulate``, which documents them; t_end [s].
 
-    rewound: whether time begins anew at the end of ``start``: loads that repeat are asked for whole periods of theirs.
-    shared: what it has in common with other runs, None where it is alone. ahead: its motion, if it has been carried.
+    rewound: whether time begins anew at the end of ``start``, for periodic loads over whole periods. shared: levels and
+    arrays that it shares with other runs, None where it is alone. ahead: its motion, where it is already at the end.
     """
 
     model: MultiPhiModel
@@ -193,28 +194,28 @@ class Run:
     start: Trajectory | Equilibrium | None = None
     stretches: Mapping[str, float] | None = None
     rewound: bool = False
-    shared: Shared | None = None
+    shared: SharedResources | None = None
     ahead: Motion | None = None
 
     def trajectory(self) -> Trajectory:
-        """The answer without warnings: for runs that are one of many of an answer."""
+        """Trajectory without warnings, for runs that are parts of another result."""
         if isinstance(self.model.modes, Tolerance):
-            return self._decided()
+            return self._with_decided_modes()
 
         return to_tolerance(self._to_end, self.loads)
 
     def _to_end(self, finer: float) -> Trajectory:
-        """The answer, with smooth courses of loads to their tolerance / finer."""
+        """Trajectory with smooth courses of loads interpolated to their tolerance / finer."""
         motion = self._motion(finer)
         motion.advance(self.t_end)
-        return motion.trajectory(self.t_end, self._again)
+        return motion.trajectory(self.t_end, self._rerun)
 
     def begun(self) -> Motion:
-        """A motion at its start."""
-        return self._motion().begin()
+        """Motion at its start, the events there included."""
+        return self._motion().process_start()
 
     def _motion(self, finer: float = 1.0) -> Motion:
-        """A motion before its start; smooth courses of loads are taken to their tolerance / finer."""
+        """Motion before its start, with smooth courses of loads interpolated to their tolerance / finer."""
         if self.ahead is not None and finer == 1.0:
             return self.ahead
         if self.compiled and not available():
@@ -225,49 +226,49 @@ class Run:
                 levels, self.t_end, self.displacement, self.velocity, self.stretches or {}, self.compiled
             )
         else:
-            start = going_on(before, levels, self.rewound)
+            start = continued_start(before, levels, self.rewound)
         return (motion_of if self.shared is None else self.shared.motion)(levels, start, self.compiled)
 
     @property
     def _before(self) -> Trajectory | None:
-        """The trajectory from whose end this goes on."""
+        """Trajectory that this run continues, None for a new one."""
         return None if self.start is None or isinstance(self.start, Equilibrium) else self.start
 
     def levels(self, finer: float = 1.0) -> LoadedLevels:
-        """The levels under the loads, which the model keeps where nobody can change what the loads are.
+        """Levels under the loads, which the model keeps where the loads are immutable.
 
-        finer: by which smooth courses of loads are taken to a smaller part of their tolerance.
+        finer: factor by which the tolerance of smooth courses of loads is divided.
         """
         model, loads, before = self.model, unchanging(self.loads), self._before
         time = 0.0 if before is None or self.rewound else before.t_end
 
-        def made() -> LoadedLevels:
+        def build() -> LoadedLevels:
             excitation = Excitation.of(model, self.loads, self.t_end, finer)
             return LoadedLevels.under(model, excitation, time, self.t_end, lasting=self.t_end)
 
         if self.shared is not None:
-            return self.shared.levels((id(model), finer), made)
-        return made() if loads is None else model.loaded.get_or_build((loads, time, self.t_end, finer), made)
+            return self.shared.levels((id(model), finer), build)
+        return build() if loads is None else model.loaded.get_or_build((loads, time, self.t_end, finer), build)
 
-    def _decided(self) -> Trajectory:
-        """The answer of a model whose number of modes the first run decides."""
+    def _with_decided_modes(self) -> Trajectory:
+        """Trajectory of a model whose number of modes the first run decides."""
         if self.model.decided is not None:
             return replace(self, model=self.model.decided).trajectory()
-        trajectory = adapted(self.model, lambda chosen: replace(self, model=chosen).trajectory())
+        trajectory = run_with_enough_modes(self.model, lambda chosen: replace(self, model=chosen).trajectory())
         if trajectory.status == "ok":
             self.model.decide(trajectory.model)
         return trajectory
 
-    def _again(self, y: np.ndarray, v: np.ndarray) -> Trajectory:
-        """The run from y, y' (m,) in base coordinates."""
+    def _rerun(self, y: np.ndarray, v: np.ndarray) -> Trajectory:
+        """Trajectory of the same run from y, y' (m,) in base coordinates."""
         if isinstance(self.start, Trajectory):
-            return replace(self, start=nudged(self.start, v), ahead=None).trajectory()
+            return replace(self, start=with_final_velocity(self.start, v), ahead=None).trajectory()
         shapes = self.model.base.modes.shapes
         return replace(self, displacement=shapes @ y, velocity=shapes @ v, ahead=None).trajectory()
 
 
 def started(run: Run) -> Run:
-    """The run with its start looked into: an equilibrium is its displacement and its stretches."""
+    """Run with a checked start, where an equilibrium is replaced by its displacement and stretches."""
     start = run.start
     if start is not None:
         _check_start(run)

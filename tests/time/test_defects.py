@@ -11,7 +11,7 @@ from small_structures import chain
 import multiphi_exudyn as mp
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.time.reliability.defects import defects, total_defect
-from multiphi_exudyn.time.segments.segment import listed
+from multiphi_exudyn.time.segments.segment import as_segments
 from multiphi_exudyn.time.simulate import Run
 
 
@@ -31,7 +31,7 @@ def of_instants(run):
 
     Of those with one decision; who is struck stays closed.
     """
-    segments, base, found = listed(run.segments), run.model.base, {}
+    segments, base, found = as_segments(run.segments), run.model.base, {}
     for k in range(1, len(segments.starts)):
         before, after = (segments.levels[segments.numbers[i]] for i in (k - 1, k))
         if before.states == after.states or np.count_nonzero(segments.starts == segments.starts[k]) > 1:

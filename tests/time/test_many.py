@@ -67,7 +67,7 @@ def carried(arrays, starts, sums_works=True):
         motion.advance(END)
     motion = Motion(arrays, starts[0])
     motion.sums_works = sums_works
-    return batch.Several.carried(motion, starts, END, lambda function, *given: function(*given))
+    return batch.Batch.run(motion, starts, END, lambda function, *given: function(*given))
 
 
 LOADS = {
@@ -134,9 +134,9 @@ class TestSeveralRunsTogether:
     def calls(self, monkeypatch):
         """(Of several runs, by one call: how many came to their ends; of one run)."""
         together, single = [], []
-        carry_several, carry = batch.carry_several, workers.carry
+        advance_batch, carry = batch.advance_batch, workers.carry
         monkeypatch.setattr(
-            batch, "carry_several", lambda *given: together.append(carry_several(*given)) or together[-1]
+            batch, "advance_batch", lambda *given: together.append(advance_batch(*given)) or together[-1]
         )
         monkeypatch.setattr(workers, "carry", lambda *given: single.append(1) or carry(*given))
         return together, single
@@ -218,7 +218,7 @@ class TestSeveralRunsTogether:
             found_all = carried(LevelArrays(levels), given, sums_works)
         assert found_all.count == 3
         for k, run in enumerate(runs):
-            found = found_all.land(k).trajectory(END)
+            found = found_all.motion(k).trajectory(END)
             assert [(s.start, s.end, s.phases) for s in found.segments] == [
                 (s.start, s.end, s.phases) for s in run.segments
             ]

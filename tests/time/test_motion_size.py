@@ -10,7 +10,7 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.events.arrays import LOOK_END, LOOKED
 from multiphi_exudyn.time.loop.motion_size import INDICATOR, SAMPLES, is_small
 from multiphi_exudyn.time.record.record import Record
-from multiphi_exudyn.time.segments.segment import listed
+from multiphi_exudyn.time.segments.segment import as_segments
 from multiphi_exudyn.time.simulate import Run
 
 pytestmark = pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
@@ -51,7 +51,7 @@ def sizes(run):
 def test_what_the_loop_sees_is_what_the_record_tells(loads, stiffness, compiled):
     first, second = runs(model(4, stiffness), loads=loads, compiled=compiled)
     assert sizes(first) is None
-    assert sizes(second) == pytest.approx(listed(second.segments).sizes(END), rel=1e-9)
+    assert sizes(second) == pytest.approx(as_segments(second.segments).sizes(END), rel=1e-9)
     assert first.warnings == second.warnings
     assert any(sentence.startswith("truncation:") for sentence in second.warnings)
 
@@ -82,7 +82,7 @@ def test_a_run_that_tells_of_its_energy_alone_is_not_sampled_where_it_begins_wit
 
 def test_a_run_that_loses_little_is_not_looked_at_beyond_its_first_decision():
     given = model(17, stiffness=2e4)
-    listed(runs(given, count=1)[0].segments).sizes(END)  # packed
+    as_segments(runs(given, count=1)[0].segments).sizes(END)  # packed
     run = runs(given)[0]
     assert run.warnings == ()
     assert len(run.events) > 2
@@ -94,7 +94,7 @@ def test_a_motion_that_meets_nothing_is_not_looked_at():
     given = model(17, stiffness=2e4)
     for _ in range(2):
         run = mp.simulate(given, 1e-5, displacement=BENT)
-        listed(run.segments).sizes(1e-5)  # packed
+        as_segments(run.segments).sizes(1e-5)  # packed
     assert len(run.events) == 0
     assert run.ending.numbers[LOOKED] == 0
 
@@ -105,14 +105,14 @@ def test_a_run_that_goes_on_is_looked_at_from_there():
     for loads in LOADS.values():
         for _ in range(2):
             run = mp.simulate(given, 1.7 * END, start=first, loads=loads)
-        assert sizes(run) == pytest.approx(listed(run.segments).sizes(1.7 * END), rel=1e-9)
+        assert sizes(run) == pytest.approx(as_segments(run.segments).sizes(1.7 * END), rel=1e-9)
 
 
 def test_a_run_without_displacement_at_its_start_is_looked_at():
     given = model(4)
     for _ in range(2):
         run = mp.simulate(given, END, velocity=40 * BENT)
-    assert sizes(run) == pytest.approx(listed(run.segments).sizes(END), rel=1e-9)
+    assert sizes(run) == pytest.approx(as_segments(run.segments).sizes(END), rel=1e-9)
 
 
 def test_a_motion_carried_in_steps_is_not_taken_for_one_that_was_looked_at():
@@ -124,7 +124,7 @@ def test_a_motion_carried_in_steps_is_not_taken_for_one_that_was_looked_at():
         motion.advance(end)
     run = motion.trajectory(END)
     assert sizes(run) is None
-    assert listed(run.segments).sizes(END) == pytest.approx(sizes(whole), rel=1e-9)
+    assert as_segments(run.segments).sizes(END) == pytest.approx(sizes(whole), rel=1e-9)
     again = Run(given, END, BENT).begun()
     again.go_on_from(whole.final, END)
     again.advance(1.5 * END)

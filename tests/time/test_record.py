@@ -27,7 +27,7 @@ def test_bytes_of_an_event(modes, driven, asked):
     assert events > 15_000
     assert record.bytes <= asked * (1 + 1 / FILLED) * events
     run.ledger, run.events.table(), run.at("m0", 50.0)
-    assert record.bytes + record.places.nbytes <= asked * events
+    assert record.bytes + record.event_rows.nbytes <= asked * events
 
 
 @pytest.mark.parametrize("driven", [False, True])
@@ -60,7 +60,7 @@ def test_impacts_are_kept_of_what_is_struck_alone():
         for event in run.events
     ]
     assert 0 < sum(kept) < len(kept)
-    assert_array_equal(record.struck, record.places[kept])
+    assert_array_equal(record.struck, record.event_rows[kept])
     assert all(event.contact == "hard" for event, one in zip(run.events, kept, strict=True) if one)
-    assert_array_equal(record.losses[record.places], [event.loss for event in run.events])
+    assert_array_equal(record.losses[record.event_rows], [event.loss for event in run.events])
     assert run.events.table()[:, 2].tolist() == [event.impulse for event in run.events]

@@ -17,7 +17,7 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.events.transitions.state import event_table
 from multiphi_exudyn.time.loop import chatter
 from multiphi_exudyn.time.reliability.defects import defects
-from multiphi_exudyn.time.reliability.friction_warnings import rubbing_warnings
+from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
 from multiphi_exudyn.time.reliability.run_warnings import warnings_of
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 
@@ -449,7 +449,7 @@ class TestFriction:
         run = mp.simulate(model, 60.0)
         assert sum(event.kind == "slip" for event in run.events) > 5
         with mock.patch.object(type(run.segments), "values", side_effect=AssertionError):
-            assert list(rubbing_warnings(run.segments, model)) == []
+            assert list(friction_warnings(run.segments, model)) == []
 
     @pytest.mark.parametrize(("modes", "told"), [(7, ["backward slip"]), (9, []), ("all", [])])
     def test_that_truncation_turns_round_is_told(self, modes, told):

@@ -12,7 +12,7 @@ from small_structures import chain, stop
 import multiphi_exudyn as mp
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.time.run.start import first_start
-from multiphi_exudyn.time.run.start_projection import SettingOut
+from multiphi_exudyn.time.run.start_projection import StartProjection
 from multiphi_exudyn.time.simulate import Run
 
 END = 2.0
@@ -26,7 +26,7 @@ def model(stiffness=math.inf):
 
 def setting_out(base, near=0.0):
     units = base.directions / np.linalg.norm(base.directions, axis=0)
-    return SettingOut(base, np.ones(N), units, np.full(units.shape[1], -1.0), near)
+    return StartProjection(base, np.ones(N), units, np.full(units.shape[1], -1.0), near)
 
 
 numbers = st.lists(st.sampled_from([0.0, 1.0, -2.0, 1e-15, 3e-9, 0.1, 1e4]), min_size=N, max_size=N)

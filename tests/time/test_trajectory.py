@@ -14,7 +14,7 @@ from multiphi_exudyn import ConstantLoad, MultiPhiModel, RayleighDamping, simula
 from multiphi_exudyn.events.transitions.state import total_impulse
 from multiphi_exudyn.time.record.record import Record
 from multiphi_exudyn.time.record.recorded_segments import Events, Recorded
-from multiphi_exudyn.time.segments.segment import Listed
+from multiphi_exudyn.time.segments.segment import SegmentList
 
 SOFT = 40.0
 LOAD = -0.7
@@ -182,7 +182,7 @@ class TestContacts:
     @pytest.mark.parametrize("contact", ["stop", "soft"])
     def test_impulse_of_a_run_is_that_of_its_segments_and_makes_none_of_them(self, run, contact, monkeypatch):
         row, segments = run._row("contact_impulse", contact), tuple(run.segments)
-        expected = Listed(segments).integral(row, 1.3, 14.4) + total_impulse(tuple(run.events), contact, 1.3, 14.4)
+        expected = SegmentList(segments).integral(row, 1.3, 14.4) + total_impulse(tuple(run.events), contact, 1.3, 14.4)
         monkeypatch.setattr(Record, "segment", None)
         monkeypatch.setattr(Events, "_make", None)
         again = dataclasses.replace(run, segments=Recorded(run.segments._record, math.nan, math.nan, (math.nan,) * 3))

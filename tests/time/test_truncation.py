@@ -11,7 +11,7 @@ from small_structures import chain, stop
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.time.reliability.defects import defects
-from multiphi_exudyn.time.reliability.truncation import adapted
+from multiphi_exudyn.time.reliability.truncation import run_with_enough_modes
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 
 END = 0.3
@@ -117,7 +117,7 @@ def test_a_failed_run_is_returned_as_it_is():
     def fails(chosen):
         return dataclasses.replace(mp.simulate(chosen, 1.0, displacement=np.ones(4)), status="failed", message="cause")
 
-    run = adapted(model, fails)
+    run = run_with_enough_modes(model, fails)
     assert (run.status, run.message) == ("failed", "cause")
     assert run.model.level(()).modes == 3
 

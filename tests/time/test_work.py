@@ -10,7 +10,7 @@ from small_structures import chain, oscillator
 import multiphi_exudyn as mp
 from multiphi_exudyn.events import arrays
 from multiphi_exudyn.time.record import record
-from multiphi_exudyn.time.segments.segment import Listed, listed
+from multiphi_exudyn.time.segments.segment import SegmentList, as_segments
 from multiphi_exudyn.time.simulate import Run
 
 COMPLIANT = (mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0))
@@ -50,7 +50,7 @@ def run_of(damping, contacts, loads, t_end=5.0, start=(0.03, 0.06, -0.09)):
 
 def assert_works_of_segments(run):
     """Of those that the loop has summed, and all integrated afterwards."""
-    found, expected = listed(run.segments).works, Listed(tuple(run.segments)).works
+    found, expected = as_segments(run.segments).works, SegmentList(tuple(run.segments)).works
     integrated = run.segments._record.works(np.arange(len(run.segments)))
     size = np.max(np.abs(run.energy(np.linspace(0, run.t_end, 101)))) + abs(expected[1])
     assert_allclose(found, expected, rtol=0, atol=1e-12 * size)
@@ -76,7 +76,7 @@ def test_samples_and_their_works_take_no_more_terms_than_a_straight_line_has():
     run = run_of(DAMPINGS["coupled"], COMPLIANT, LOADS["samples"], t_end=3.97)
     assert run.segments.arrays.ints[arrays.FLOW_COUNT] == 3 + 2
     assert_works_of_segments(run)
-    listed(run.segments)._record.works(np.arange(len(run.segments)))
+    as_segments(run.segments)._record.works(np.arange(len(run.segments)))
     assert run.segments.arrays.ints[arrays.FLOW_COUNT] == 3 + 2
 
 
@@ -163,7 +163,7 @@ def test_a_run_asked_on_the_way_keeps_its_ledger_when_it_goes_on():
         motion.advance(3.0)
         late = motion.trajectory(3.0)
         for run in (late, early):
-            assert_allclose(run.segments.works, Listed(tuple(run.segments)).works, rtol=0, atol=1e-12)
+            assert_allclose(run.segments.works, SegmentList(tuple(run.segments)).works, rtol=0, atol=1e-12)
             assert abs(run.ledger.residual) < 1e-12
 
 

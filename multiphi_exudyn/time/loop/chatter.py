@@ -6,21 +6,21 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 
 __all__ = ["limits"]
 
-EVENTS_PER_PERIOD = 20  # of the fastest mode or load, for every contact: more, over CHATTER_WINDOW, is chatter
-CHATTER_WINDOW = 200  # events, for every contact
+EVENTS_PER_PERIOD = 20  # of the fastest mode or load, for each contact: more, over CHATTER_WINDOW, is chatter
+CHATTER_WINDOW = 200  # events, for each contact
 
 
 def limits(model: MultiPhiModel) -> tuple[int, float]:
-    """How many of the last events the chatter check is about, and how many of them a period may hold.
+    """Window of the chatter check [events], and largest number of events in a period of the highest mode or load.
 
-    That of the highest kept mode or load. So many for every contact: stops side by side are all struck in a small part
-    of a period, once each. A swing passes every knot of a law twice.
+    Both grow with the number of contacts: stops side by side are all struck in a small part of a period, once each.
+    An oscillation passes every knot of a force law twice.
     """
-    found: tuple[int, float] = model.entries.get_or_build("chatter", lambda: _limits(model))
-    return found
+    window_and_limit: tuple[int, float] = model.entries.get_or_build("chatter", lambda: _limits(model))
+    return window_and_limit
 
 
 def _limits(model: MultiPhiModel) -> tuple[int, float]:
-    plain = max(1, len(model.contacts) - len(model.force_laws))  # contacts that are no force laws
+    contacts = max(1, len(model.contacts) - len(model.force_laws))  # that are no force laws
     knots = sum(law.levels for law in model.force_laws)
-    return CHATTER_WINDOW * plain, EVENTS_PER_PERIOD * plain + 2 * knots
+    return CHATTER_WINDOW * contacts, EVENTS_PER_PERIOD * contacts + 2 * knots

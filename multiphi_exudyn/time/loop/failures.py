@@ -1,4 +1,4 @@
-"""Failures: what has stopped the loop, said in a sentence that names the contacts and what is needed."""
+"""Failures: the cause that has stopped the loop, as a sentence that names the contacts and what is needed."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ __all__ = ["failure"]
 
 
 def failure(arrays: LevelArrays) -> NumericalFailure:
-    """What the loop says in its arrays of why it has failed."""
+    """Return the error of a failed loop, from the cause and the numbers in its arrays."""
     ints, model = arrays.ints, arrays.levels.model
-    told = arrays.numbers[a.TOLD : a.TOLD + 3].tolist()
+    facts = arrays.numbers[a.TOLD : a.TOLD + 3].tolist()
     flags = ints[ints[a.CAUSED_BY] :][: ints[a.ELEMENTS]]
     names = ", ".join(model.contacts[i].name for i in np.flatnonzero(flags).tolist())
     complete = model.level_at(()).modes == model.base.modes.count
-    window, allowed = limits(model)
+    window, limit = limits(model)
     sentences = {
         a.NOT_FINITE: "the motion is not finite",
-        a.TOO_LONG: f"search for the next event: got motion of up to {told[0] / (2 * math.pi):g} Hz, whose "
-        f"samples every {told[1]:g} s until the end, in {told[2]:g} s, would take for ever; "
+        a.TOO_LONG: f"search for the next event: got motion of up to {facts[0] / (2 * math.pi):g} Hz, whose "
+        f"samples every {facts[1]:g} s until the end, in {facts[2]:g} s, would take too long; "
         "need fewer modes or a shorter run",
-        a.CHATTER: f"chatter: {window} events in {told[0]:g} s, more than {allowed} in a period of the "
-        f"highest kept mode or load ({told[1]:g} Hz), or all within {ACCUMULATED:g} of the time so far; more modes or "
+        a.CHATTER: f"chatter: {window} events in {facts[0]:g} s, more than {limit} in a period of the "
+        f"highest kept mode or load ({facts[1]:g} Hz), or all within {ACCUMULATED:g} of the time so far; more modes or "
         "contacts of finite stiffness may help",
         a.NOT_ADMISSIBLE: f"contacts {names}: no set of closed contacts is admissible at this instant",
         a.SQUEEZED: f"rigid contacts {names}: their stops move against each other and leave no way out"

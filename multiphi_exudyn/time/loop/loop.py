@@ -2,8 +2,8 @@
 
 Within a level the motion is a sum of exponentials; the next event is the certified first descent of a few of them
 (zero_crossing.py); the event rule (decision.py) gives the state that follows. Nothing of a segment is kept before it
-is complete: where something is missing (NEED), or the record is full (FULL), the loop is called again, and the segment
-is made again from its start.
+is complete: where the arrays lack something (NEED), or the record is full (FULL), the caller supplies it and calls the
+loop again, which computes the segment anew from its start.
 """
 
 from __future__ import annotations
@@ -104,8 +104,8 @@ from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves,
 from multiphi_exudyn.mathematics.response.basis_arrays import SCALES
 from multiphi_exudyn.mathematics.search.zero_crossing import INSTANT, NONE, first_descent
 from multiphi_exudyn.time.loop.loop_record import is_chatter, keep_events, keep_segment
-from multiphi_exudyn.time.loop.motion_size import INDICATOR, begin_look, keep_look, look
-from multiphi_exudyn.time.loop.verdict import judge
+from multiphi_exudyn.time.loop.motion_size import INDICATOR, begin_size_samples, keep_size_samples, sample_motion_size
+from multiphi_exudyn.time.loop.verdict import set_verdict
 from multiphi_exudyn.time.loop.work_sums import work_of_segment
 
 __all__ = ["advance"]
@@ -115,41 +115,41 @@ SEARCH_TOO_LONG = -3  # zero_crossing.TOO_LONG
 
 @compiled
 def advance(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
-    """Carries the state CURRENT, or the start, to ``end``, or to what stops it.
+    """Advance the state CURRENT, or the start, to ``end`` [s] or to what stops the run before.
 
-    END_REACHED, EVENT, NEED, FULL or FAILED.
+    Return END_REACHED, EVENT, NEED, FULL or FAILED. The energy of the final state and the verdict are set on the way.
     """
-    status = travel(ints, numbers, waves, end)
-    left = kinetic(ints, numbers, CURRENT) + strain(ints, numbers, CURRENT) if ints[STARTING] == 0 else math.nan
-    numbers[LEFT_ENERGY] = left
+    status = run_segments(ints, numbers, waves, end)
+    final_energy = kinetic(ints, numbers, CURRENT) + strain(ints, numbers, CURRENT) if ints[STARTING] == 0 else math.nan
+    numbers[LEFT_ENERGY] = final_energy
     if ints[JUDGED] == 1:
-        judge(numbers, ints[ISOLATED], INDICATOR, numbers[TIME])
+        set_verdict(numbers, ints[ISOLATED], INDICATOR, numbers[TIME])
     return status
 
 
 @compiled
-def travel(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
-    """The same, without what is told of the state that it comes to, and of what truncation has taken so far."""
+def run_segments(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
+    """Advance the state as ``advance`` does, without its final energy and the verdict."""
     if ints[STARTING] > 0:
         fresh = ints[STARTING] == FRESH
-        status = set_out(ints, numbers, waves) if fresh else go_on(ints, numbers, waves)
+        status = begin_run(ints, numbers, waves) if fresh else continue_run(ints, numbers, waves)
         if status < 0:
             return status
-        begin_look(ints, numbers, GIVEN if fresh else -1, end)
+        begin_size_samples(ints, numbers, GIVEN if fresh else -1, end)
     while numbers[TIME] < end:
         if ints[SEGMENT_COUNT] >= ints[SEGMENT_ROOM]:
             return FULL
-        known = ints[EVENT_COUNT]
+        events_before = ints[EVENT_COUNT]
         status = OK
         if ints[PRESCRIBED] > 0 and numbers[TIME] >= piece_end(ints, numbers):
-            status = next_piece(ints, numbers, waves, end)
+            status = begin_next_piece(ints, numbers, waves, end)
         if status >= 0 and ints[WORKING] == 1 and ints[ints[CURRENT + LEVEL] + DISSIPATION] == 0:
             ints[NEEDED], ints[NEEDED_FROM], status = NEED_POWERS, ints[CURRENT + LEVEL], NEED
         if status >= 0:
-            until = min(end, piece_end(ints, numbers)) if ints[PRESCRIBED] > 0 else end
-            status = one_segment(ints, numbers, waves, until)
-        status = given_up(ints, status)
-        if status >= 0 and ints[EVENT_COUNT] > known:
+            segment_end = min(end, piece_end(ints, numbers)) if ints[PRESCRIBED] > 0 else end
+            status = advance_segment(ints, numbers, waves, segment_end)
+        status = fail_if_unavailable(ints, status)
+        if status >= 0 and ints[EVENT_COUNT] > events_before:
             status = EVENT
         if status < 0 or (status == EVENT and ints[STOP_AT_EVENT] == 1):
             return status
@@ -161,7 +161,7 @@ def travel(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
 
 @compiled
 def is_finite(ints: Ints, numbers: Numbers) -> int:
-    """1 where all coordinates of the present state are finite."""
+    """Return 1 where all coordinates of the present state are finite, else 0."""
     x = ints[CURRENT + PLACE]
     for i in range(ints[ints[CURRENT + LEVEL] + MODES] + ints[CHANNELS]):
         if numbers[x + i] - numbers[x + i] != 0.0:
@@ -170,17 +170,17 @@ def is_finite(ints: Ints, numbers: Numbers) -> int:
 
 
 @compiled
-def set_out(ints: Ints, numbers: Numbers, waves: Waves) -> int:
-    """The first state of the run becomes the current one, with the events of the start; OK, NEED or FAILED."""
-    status = given_up(ints, begin(ints, numbers, waves))
+def begin_run(ints: Ints, numbers: Numbers, waves: Waves) -> int:
+    """Make the first state of the run the current one, with the events of the start; return OK, NEED or FAILED."""
+    status = fail_if_unavailable(ints, begin(ints, numbers, waves))
     if ints[FORCED_WANTED] > ints[FORCED_ROOM]:
         ints[NEEDED], status = NEED_ROOM, NEED
     if status >= 0 and ints[JUDGED] == 1 and find_map(ints, ints[GIVEN + LEVEL], ints[WORKED + LEVEL]) < 0:
-        status = given_up(ints, NEED)
+        status = fail_if_unavailable(ints, NEED)
     if status < 0:
         return status
     ints[STARTING] = 0
-    for k in range(LOSSES):  # what no event carries
+    for k in range(LOSSES):  # losses of the start that no event records
         numbers[LOST_AT_START + k] = numbers[LOST + k] if ints[CHANGE_COUNT] == 0 else 0.0
     numbers[WORK] = pattern_work(ints, numbers, WORKED) - pattern_work(ints, numbers, GIVEN)
     numbers[GIVEN_ENERGY] = energy(ints, numbers, GIVEN) + numbers[GIVEN_SPRINGS]
@@ -192,14 +192,14 @@ def set_out(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 
 
 @compiled
-def go_on(ints: Ints, numbers: Numbers, waves: Waves) -> int:
-    """The state that another run has come to is the first one; where loads have changed, elements may ask.
+def continue_run(ints: Ints, numbers: Numbers, waves: Waves) -> int:
+    """Begin at the final state of another run; return OK, NEED or FAILED.
 
-    OK, NEED or FAILED.
+    Where the loads differ from those before, elements may change their states at once.
     """
     numbers[GIVEN_ENERGY] = energy(ints, numbers, CURRENT)
     copy_state(ints, numbers, CURRENT, REACHED)
-    status = given_up(ints, decide_jump(ints, numbers, waves))
+    status = fail_if_unavailable(ints, decide_jump(ints, numbers, waves))
     if status < 0:
         return status
     ints[STARTING] = 0
@@ -213,8 +213,8 @@ def go_on(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 
 
 @compiled
-def given_up(ints: Ints, status: int) -> int:
-    """What is needed and cannot be had is a failure."""
+def fail_if_unavailable(ints: Ints, status: int) -> int:
+    """Return the status, FAILED where the loop needs (NEED) what cannot be supplied."""
     if status == NEED and ints[GIVEN_UP] == 1:
         ints[CAUSE] = UNAVAILABLE
         return FAILED
@@ -222,8 +222,11 @@ def given_up(ints: Ints, status: int) -> int:
 
 
 @compiled
-def next_piece(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
-    """The same state on the piece that follows; a load that jumps may make elements ask; OK, NEED, FULL or FAILED."""
+def begin_next_piece(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
+    """Begin the next piece of the channels in the present state; return OK, NEED, FULL or FAILED.
+
+    Where a load jumps, elements may change their states.
+    """
     r, q, level = ints[ints[CURRENT + LEVEL] + MODES], ints[CHANNELS], ints[CURRENT + LEVEL]
     if ints[PIECE] + 1 >= ints[PIECE_COUNT]:
         ints[NEEDED] = NEED_PIECES
@@ -241,7 +244,7 @@ def next_piece(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
         for i in range(r if row >= 0 else 0):
             numbers[v + i] += numbers[row + k * (r + q) + i] * jump
     measure(ints, numbers, REACHED)
-    status = given_up(ints, decide_jump(ints, numbers, waves))
+    status = fail_if_unavailable(ints, decide_jump(ints, numbers, waves))
     if status == NEED or ints[EVENT_COUNT] + ints[CHANGE_COUNT] > ints[EVENT_ROOM]:
         ints[PIECE] -= 1
         return NEED if status == NEED else FULL
@@ -258,77 +261,77 @@ def next_piece(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
 
 
 @compiled
-def one_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
-    """One level's motion up to the next decision, or to ``end``; OK, EVENT, NEED, FULL or FAILED.
+def advance_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
+    """Advance within one level to the next decision, or to ``end`` [s]; return OK, EVENT, NEED, FULL or FAILED.
 
     Exits are armed on the way: the state REACHED has their phases, and becomes the state of the instant.
     """
-    level, started, samples = ints[CURRENT + LEVEL], numbers[TIME], numbers[ints[FOUND] + 1]
-    horizon, reached, armed_at, asking = end - started, 0.0, 0.0, 0
+    level, start_time, samples = ints[CURRENT + LEVEL], numbers[TIME], numbers[ints[FOUND] + 1]
+    horizon, elapsed, armed_at, decision_due = end - start_time, 0.0, 0.0, 0
     if ints[PRESCRIBED] > 0:
-        set_drive(ints, numbers, waves, ints[DRIVE_WAVES], 0.0, started, end)
+        set_drive(ints, numbers, waves, ints[DRIVE_WAVES], 0.0, start_time, end)
     expand(ints, numbers, waves, CURRENT)
     copy_state(ints, numbers, CURRENT, REACHED)
-    while asking == 0:
+    while decision_due == 0:
         count = watch(ints, numbers, waves)
         if count < 0:
             numbers[ints[FOUND] + 1] = samples
             return count
-        found = first_descent(
-            ints, numbers, waves, ints[FLOW_BASIS], ints[SIGNALS], ints[CONSTANTS], ints[NOISES], count, reached,
+        signal = first_descent(
+            ints, numbers, waves, ints[FLOW_BASIS], ints[SIGNALS], ints[CONSTANTS], ints[NOISES], count, elapsed,
             horizon, ints[SEARCH_NUMBERS], ints[SEARCH_WAVES], ints[FOUND],
         )  # fmt: skip
-        if found < NONE:
-            ints[CAUSE] = TOO_LONG if found == SEARCH_TOO_LONG else NOT_FINITE
+        if signal < NONE:
+            ints[CAUSE] = TOO_LONG if signal == SEARCH_TOO_LONG else NOT_FINITE
             numbers[TOLD] = numbers[ints[ints[FLOW_BASIS] + SCALES] + 1]
             numbers[TOLD + 1] = numbers[ints[FOUND] + 2]
             numbers[TOLD + 2] = numbers[ints[FOUND] + 3]
             return FAILED
-        if found == NONE:
-            reached = horizon
+        if signal == NONE:
+            elapsed = horizon
             break
-        reached = numbers[ints[FOUND]]
-        asking = who_asks(ints, numbers, waves, count, found, reached)
-        if asking == 0:
-            arm(ints, ints[ints[WAITING] + 2 * found])
-            armed_at = reached
-    numbers[INSTANT_TIME] = end if reached == horizon else started + reached
-    if reached > 0.0:  # at its start the state is what it was, without the round-off of its terms
-        state_at(ints, numbers, waves, level, reached, ints[REACHED + PLACE], ints[REACHED + SPEED])
+        elapsed = numbers[ints[FOUND]]
+        decision_due = who_asks(ints, numbers, waves, count, signal, elapsed)
+        if decision_due == 0:
+            arm(ints, ints[ints[WAITING] + 2 * signal])
+            armed_at = elapsed
+    numbers[INSTANT_TIME] = end if elapsed == horizon else start_time + elapsed
+    if elapsed > 0.0:  # at the start the state is exact, its terms would add round-off
+        state_at(ints, numbers, waves, level, elapsed, ints[REACHED + PLACE], ints[REACHED + SPEED])
     unit = numbers[HORIZON]
     if ints[PRESCRIBED] > 0:
-        set_drive(ints, numbers, waves, ints[DRIVE_NEXT], reached, numbers[INSTANT_TIME], end)
+        set_drive(ints, numbers, waves, ints[DRIVE_NEXT], elapsed, numbers[INSTANT_TIME], end)
     measure(ints, numbers, REACHED)
-    ints[SUMMED] = work_of_segment(ints, numbers, waves, reached) if ints[WORKING] == 1 else 0
+    ints[SUMMED] = work_of_segment(ints, numbers, waves, elapsed) if ints[WORKING] == 1 else 0
     fastest = numbers[ints[ints[FLOW_BASIS] + SCALES] + 1]
-    at_once = reached <= (INSTANT / fastest if fastest > 0.0 else 0.0)
-    look(ints, numbers, waves)
+    at_once = elapsed <= (INSTANT / fastest if fastest > 0.0 else 0.0)
+    sample_motion_size(ints, numbers, waves)
     status = OK
-    if asking > 0:
+    if decision_due > 0:
         flag_again(ints, 1 if at_once and ints[WHOLE] == 0 else 0)
         status = decide(ints, numbers, waves)
     else:
         ints[CHANGE_COUNT] = 0
-    status = given_up(ints, status)
+    status = fail_if_unavailable(ints, status)
     if ints[FORCED_WANTED] > ints[FORCED_ROOM]:
         ints[NEEDED], status = NEED_ROOM, NEED
     if status == NEED or ints[EVENT_COUNT] + ints[CHANGE_COUNT] > ints[EVENT_ROOM]:
         numbers[ints[FOUND] + 1] = samples
         return NEED if status == NEED else FULL
     keep_segment(ints, numbers, armed_at, unit)
-    keep_look(numbers)
+    keep_size_samples(numbers)
     if ints[PRESCRIBED] > 0:
         keep_drive(ints, waves)
-        numbers[AGE] += reached
-    if asking == 0:
+        numbers[AGE] += elapsed
+    if decision_due == 0:
         copy_state(ints, numbers, REACHED, CURRENT)
         return OK
-    return carry_on(ints, numbers, level, status)
+    return apply_decision(ints, numbers, level, status)
 
 
 @compiled
-def carry_on(ints: Ints, numbers: Numbers, level: int, status: int) -> int:
-    """The state after a decision becomes the current one, with its events; OK, EVENT or FAILED."""
+def apply_decision(ints: Ints, numbers: Numbers, level: int, status: int) -> int:
+    """Make the state after a decision the current one, and record its events; return OK, EVENT or FAILED."""
     window = ints[WINDOW]
     last = ints[RING] + 2 * (ints[DECISIONS] % (window + 1))
     numbers[last] = numbers[LAST_DECISION]

@@ -1,4 +1,4 @@
-"""What the loop records of a run: segments, events, and whether the last decisions were chatter."""
+"""Record of the loop: segments, events, and the check of the last decisions for chatter."""
 
 from __future__ import annotations
 
@@ -81,24 +81,24 @@ def keep_segment(ints: Ints, numbers: Numbers, armed_at: float, horizon: float) 
     ints[row + 3] = -1
     numbers[ints[INSTANTS] + k] = numbers[TIME]
     numbers[ints[INSTANTS] + k + 1] = numbers[INSTANT_TIME]
-    kept = ints[COORDINATE_NUMBERS] + ints[COORDINATE_COUNT]
+    place = ints[COORDINATE_NUMBERS] + ints[COORDINATE_COUNT]
     for i in range(n):
-        numbers[kept + i] = numbers[ints[CURRENT + PLACE] + i]
-        numbers[kept + n + i] = numbers[ints[CURRENT + SPEED] + i]
-    kept += 2 * n
+        numbers[place + i] = numbers[ints[CURRENT + PLACE] + i]
+        numbers[place + n + i] = numbers[ints[CURRENT + SPEED] + i]
+    place += 2 * n
     if ints[PRESCRIBED] > 0:
-        numbers[kept] = horizon
-        numbers[kept + 1] = numbers[WORK]
-        numbers[kept + 2] = numbers[AGE]
-        kept += DRIVEN_WIDTH
+        numbers[place] = horizon
+        numbers[place + 1] = numbers[WORK]
+        numbers[place + 2] = numbers[AGE]
+        place += DRIVEN_WIDTH
     if ints[CURRENT + SETTLED] == 0:
         ints[row + 3] = ints[PHASE_COUNT]
         for e in range(ints[level + EXIT_COUNT]):
             ints[ints[PHASE_INTS] + ints[PHASE_COUNT] + e] = ints[ints[CURRENT + PHASES] + e]
         ints[PHASE_COUNT] += ints[level + EXIT_COUNT]
-        numbers[kept] = armed_at
-        kept += 1
-    ints[COORDINATE_COUNT] = kept - ints[COORDINATE_NUMBERS]
+        numbers[place] = armed_at
+        place += 1
+    ints[COORDINATE_COUNT] = place - ints[COORDINATE_NUMBERS]
     ints[SEGMENT_COUNT] = k + 1
     if ints[SUMMED] == 1:
         numbers[WORKS + 1] += numbers[WORK]
@@ -113,47 +113,50 @@ def keep_segment(ints: Ints, numbers: Numbers, armed_at: float, horizon: float) 
 
 @compiled
 def keep_events(ints: Ints, numbers: Numbers) -> None:
-    """Record the changes of a decision; the first carries the energy lost at the whole instant."""
+    """Record the changes of a decision as events; the first one has the energy lost at the whole instant."""
     first = 1
     for k in range(ints[CHANGE_COUNT]):
         row = ints[EVENT_INTS] + (ints[EVENT_COUNT] + k) * EVENT_WIDTH
-        given = ints[EVENT_NUMBERS] + (ints[EVENT_COUNT] + k) * EVENT_WIDTH_NUMBERS
-        entered, impulse, carries = ints[ints[CHANGES] + k * CHANGE_WIDTH + 1], numbers[ints[CHANGE_IMPULSES] + k], 0
+        amounts = ints[EVENT_NUMBERS] + (ints[EVENT_COUNT] + k) * EVENT_WIDTH_NUMBERS
+        entered, impulse, has_losses = ints[ints[CHANGES] + k * CHANGE_WIDTH + 1], numbers[ints[CHANGE_IMPULSES] + k], 0
         ints[row] = ints[ints[CHANGES] + k * CHANGE_WIDTH]
         ints[row + 1] = entered
         ints[row + 2] = ints[ints[CHANGES] + k * CHANGE_WIDTH + 2]
-        struck = 1 if impulse != 0.0 else 0
+        has_impact = 1 if impulse != 0.0 else 0
         if first == 1 and entered != SHARED:
-            first, carries = 0, 1
+            first, has_losses = 0, 1
             for part in range(LOSSES):
                 numbers[LOST_SO_FAR + part] += numbers[LOST + part]
                 if part != KINETIC and part != STRAIN and numbers[LOST + part] != 0.0:
-                    struck = 1
+                    has_impact = 1
             numbers[TRUNCATED] += abs(numbers[LOST + KINETIC] + numbers[LOST + STRAIN])
-        numbers[given] = numbers[TIME]
-        numbers[given + 1] = numbers[LOST + KINETIC] if carries == 1 else 0.0
-        numbers[given + 2] = numbers[LOST + STRAIN] if carries == 1 else 0.0
-        if struck == 1:
-            keep_impact(ints, numbers, ints[EVENT_COUNT] + k, impulse, carries)
+        numbers[amounts] = numbers[TIME]
+        numbers[amounts + 1] = numbers[LOST + KINETIC] if has_losses == 1 else 0.0
+        numbers[amounts + 2] = numbers[LOST + STRAIN] if has_losses == 1 else 0.0
+        if has_impact == 1:
+            keep_impact(ints, numbers, ints[EVENT_COUNT] + k, impulse, has_losses)
     ints[EVENT_COUNT] += ints[CHANGE_COUNT]
 
 
 @compiled
-def keep_impact(ints: Ints, numbers: Numbers, event: int, impulse: float, carries: int) -> None:
-    """Record the impulse of an event, and the losses of its instant but those to truncation if it ``carries`` them."""
-    given = ints[IMPACT_NUMBERS] + ints[IMPACT_COUNT] * IMPACT_WIDTH
+def keep_impact(ints: Ints, numbers: Numbers, event: int, impulse: float, has_losses: int) -> None:
+    """Record the impulse of an event and, with ``has_losses``, the losses of its instant but those to truncation."""
+    amounts = ints[IMPACT_NUMBERS] + ints[IMPACT_COUNT] * IMPACT_WIDTH
     ints[ints[IMPACT_INTS] + ints[IMPACT_COUNT]] = event
-    numbers[given] = impulse
-    numbers[given + 1] = numbers[LOST + BY_IMPACT] if carries == 1 else 0.0
-    numbers[given + 2] = numbers[LOST + STOP_WORK] if carries == 1 else 0.0
-    numbers[given + 3] = numbers[LOST + DAMPING] if carries == 1 else 0.0
-    numbers[given + 4] = numbers[LOST + FRICTION] if carries == 1 else 0.0
+    numbers[amounts] = impulse
+    numbers[amounts + 1] = numbers[LOST + BY_IMPACT] if has_losses == 1 else 0.0
+    numbers[amounts + 2] = numbers[LOST + STOP_WORK] if has_losses == 1 else 0.0
+    numbers[amounts + 3] = numbers[LOST + DAMPING] if has_losses == 1 else 0.0
+    numbers[amounts + 4] = numbers[LOST + FRICTION] if has_losses == 1 else 0.0
     ints[IMPACT_COUNT] += 1
 
 
 @compiled
 def is_chatter(ints: Ints, numbers: Numbers) -> int:
-    """1 where the last window of decisions holds more than ALLOWED in a period of the fastest, or no time."""
+    """Return 1 where the last window of decisions is chatter, else 0.
+
+    It is where they are more than ALLOWED in a period of the fastest mode or load, or take no time.
+    """
     window, decisions, ring = ints[WINDOW], ints[DECISIONS], ints[RING]
     if decisions <= window:
         return 0

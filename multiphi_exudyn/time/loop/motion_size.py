@@ -1,8 +1,8 @@
-"""Looking: the size of a motion while it goes on, for the warnings of its run: the mean of |y|^2, the largest energy.
+"""Motion size: mean of |y|^2 and largest energy of a run, for its warnings.
 
-Both are taken at SAMPLES instants evenly spaced between the start of a run and its end. The loop looks at those that
-lie in a segment while its flow stands there, as soon as truncation has taken what may be told; where an instant has
-passed before, sampling.py looks at them all, if somebody asks.
+Both are sampled at SAMPLES instants, evenly spaced between the start of a run and its end. The loop samples those in a
+segment while the flow of the segment is in the arrays, from the moment when the truncation may be worth a warning.
+Where an instant has passed before that moment, sampling.py samples them all when they are requested.
 """
 
 from __future__ import annotations
@@ -36,16 +36,24 @@ from multiphi_exudyn.events.states.flow import state_at, step_on
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.response.basis_arrays import PURE
 
-__all__ = ["INDICATOR", "SAMPLES", "begin_look", "is_small", "keep_look", "look", "see"]
+__all__ = [
+    "INDICATOR",
+    "SAMPLES",
+    "add_sample_at",
+    "begin_size_samples",
+    "is_small",
+    "keep_size_samples",
+    "sample_motion_size",
+]
 
 SAMPLES = 25  # of the motion, for its mean square: known to a tenth, as an estimate of an error needs it
 HALVES = math.sqrt(2 * SAMPLES)
-INDICATOR = 0.03  # of the motion, from which truncation is told where every contact that is struck is compliant
+INDICATOR = 0.03  # of the motion: threshold of the truncation warning where every contact that is struck is compliant
 
 
 @compiled
 def is_small(lost: float, limit: float, square: float) -> int:
-    """1 where the indicator of a sum of |defect|^2 is below a limit, as |y|^2 at the start tells already.
+    """Return 1 where |y|^2 at the start shows that the indicator of a sum of |defect|^2 is below a limit, else 0.
 
     A defect has changed |y| there by no more than its size; it is the first of the samples, which count by half.
     """
@@ -53,24 +61,25 @@ def is_small(lost: float, limit: float, square: float) -> int:
 
 
 @compiled
-def begin_look(ints: Ints, numbers: Numbers, given: int, end: float) -> None:
-    """Instants from the present time to ``end`` [s]; given: the state of the start in all modes, -1 for none."""
+def begin_size_samples(ints: Ints, numbers: Numbers, start: int, end: float) -> None:
+    """Begin the samples from the present time to ``end`` [s]; start: its state in all modes, -1 for none."""
     square = 0.0
-    for i in range(ints[COORDINATES] if given >= 0 else 0):
-        square += numbers[ints[given + PLACE] + i] * numbers[ints[given + PLACE] + i]
+    for i in range(ints[COORDINATES] if start >= 0 else 0):
+        square += numbers[ints[start + PLACE] + i] * numbers[ints[start + PLACE] + i]
     numbers[GIVEN_SQUARE], numbers[LOOK_FIRST], numbers[LOOK_END] = square, numbers[TIME], end
     for part in range(LOOK_WIDTH):
         numbers[LOOKED + part] = 0.0
 
 
 @compiled
-def look(ints: Ints, numbers: Numbers, waves: Waves) -> None:
-    """SEEN: what was LOOKED at, and what there is in the segment from CURRENT to the instant.
+def sample_motion_size(ints: Ints, numbers: Numbers, waves: Waves) -> None:
+    """Set SEEN to the samples LOOKED so far and those in the segment from CURRENT to the instant.
 
-    Until the first decision nobody knows what truncation will take, so all is looked at but a segment that ends the
-    run. What a size is read from is packed when somebody has asked for it in a level (sampling.py), not before.
+    Before the first decision the later truncation is unknown, so every segment is sampled but one that ends the run.
+    A level has the rows of its size (SIZES) only once they were requested there (sampling.py); without them sampling
+    ends.
     """
-    first, end, level, passed = numbers[LOOK_FIRST], numbers[LOOK_END], ints[CURRENT + LEVEL], 0
+    first, end, level, samples_here = numbers[LOOK_FIRST], numbers[LOOK_END], ints[CURRENT + LEVEL], 0
     for part in range(LOOK_WIDTH):
         numbers[SEEN + part] = numbers[LOOKED + part]
     while end > first and numbers[SEEN] < SAMPLES:
@@ -83,26 +92,26 @@ def look(ints: Ints, numbers: Numbers, waves: Waves) -> None:
             numbers[LOOK_END] = first
             return
         weight = 1.0 if numbers[SEEN] > 0 and not last else 0.5
-        if passed > 0 and ints[ints[FLOW_BASIS] + PURE] == 1:
-            step, again = (end - first) / (SAMPLES - 1), 1 if passed > 1 else 0
+        if samples_here > 0 and ints[ints[FLOW_BASIS] + PURE] == 1:
+            step, again = (end - first) / (SAMPLES - 1), 1 if samples_here > 1 else 0
             step_on(ints, numbers, waves, level, step, again, ints[AFTER + PLACE], ints[AFTER + SPEED])
-            weigh(ints, numbers, level, weight)
+            add_sample(ints, numbers, level, weight)
         else:
-            see(ints, numbers, waves, level, t - numbers[TIME], weight)
-        passed += 1
+            add_sample_at(ints, numbers, waves, level, t - numbers[TIME], weight)
+        samples_here += 1
 
 
 @compiled
-def see(ints: Ints, numbers: Numbers, waves: Waves, level: int, delay: float, weight: float) -> None:
-    """Count the flow a ``delay`` [s] after its state: how many were SEEN, their weighted mean |y|^2, largest energy."""
+def add_sample_at(ints: Ints, numbers: Numbers, waves: Waves, level: int, delay: float, weight: float) -> None:
+    """Add the flow a ``delay`` [s] after its state to SEEN: number of samples, weighted mean |y|^2, largest energy."""
     ints[AFTER + LEVEL] = level
     state_at(ints, numbers, waves, level, delay, ints[AFTER + PLACE], ints[AFTER + SPEED])
-    weigh(ints, numbers, level, weight)
+    add_sample(ints, numbers, level, weight)
 
 
 @compiled
-def weigh(ints: Ints, numbers: Numbers, level: int, weight: float) -> None:
-    """Count the state AFTER, of a level."""
+def add_sample(ints: Ints, numbers: Numbers, level: int, weight: float) -> None:
+    """Add the state AFTER, of a level, to SEEN."""
     x, n, row = ints[AFTER + PLACE], ints[level + MODES] + ints[CHANNELS], ints[level + SIZES]
     square = 0.0
     for line in range(n + 1):
@@ -111,16 +120,16 @@ def weigh(ints: Ints, numbers: Numbers, level: int, weight: float) -> None:
             size += numbers[row + c] * numbers[x + c]
         square += size * size
         row += n + 1
-    strained = energy(ints, numbers, AFTER) + numbers[row + n]
+    total_energy = energy(ints, numbers, AFTER) + numbers[row + n]
     for c in range(n):
-        strained += numbers[row + c] * numbers[x + c]
+        total_energy += numbers[row + c] * numbers[x + c]
     numbers[SEEN] += 1.0
     numbers[SEEN + 1] += weight * square / (SAMPLES - 1)
-    numbers[SEEN + 2] = max(numbers[SEEN + 2], abs(strained))
+    numbers[SEEN + 2] = max(numbers[SEEN + 2], abs(total_energy))
 
 
 @compiled
-def keep_look(numbers: Numbers) -> None:
-    """What was SEEN counts: its segment is recorded."""
+def keep_size_samples(numbers: Numbers) -> None:
+    """Make SEEN the samples LOOKED, as their segment is recorded."""
     for part in range(LOOK_WIDTH):
         numbers[LOOKED + part] = numbers[SEEN + part]

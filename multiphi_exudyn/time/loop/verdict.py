@@ -1,11 +1,11 @@
-"""Verdict: how much truncation took of a run, as two numbers, which the loop has when a run ends.
+"""Verdict: the effect of truncation on a run, as two numbers that the loop has when the run ends.
 
-    the energy lost of the largest energy of the run, whatever its sign at an instant
-    the indicator of the motion: sqrt( sum of |defect|^2 / mean of |y|^2 )                    (truncation.py)
+    energy lost to truncation / largest energy of the run, both without their signs
+    indicator of the motion: sqrt( sum of |defect|^2 / mean of |y|^2 )                        (truncation.py)
 
-Each is zero where it is too small for a warning, and not a number where it is not known yet: the size of the motion,
-where the loop has not summed it (motion_size.py), or a defect. The thresholds are calibrated on random truncated models
-that are compared with all modes: tests/campaign/truncation_study.py.
+Each is zero where it is too small for a warning. It is not a number where it is not known yet, because the loop has not
+sampled the size of the motion (motion_size.py) or has not summed the defects. The thresholds are calibrated on random
+truncated models that are compared with all modes: tests/campaign/truncation_study.py.
 """
 
 from __future__ import annotations
@@ -28,34 +28,37 @@ from multiphi_exudyn.events.arrays import (
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled
 from multiphi_exudyn.time.loop.motion_size import SAMPLES, is_small
 
-__all__ = ["indicator", "judge", "share_lost"]
+__all__ = ["indicator", "lost_share", "set_verdict"]
 
 ENERGY_SHARE = 0.01  # of the largest energy of a run
 
 
 @compiled
-def judge(numbers: Numbers, isolated: int, limit: float, end: float) -> None:
-    """The VERDICT on a run to ``end`` [s] from its numbers.
+def set_verdict(numbers: Numbers, isolated: int, limit: float, end: float) -> None:
+    """Set the VERDICT on a run to ``end`` [s] from its numbers.
 
-    isolated: 1 where it has no more energy than at its start. limit: of the indicator, from which it is told.
+    isolated: 1 where the run never has more energy than at its start. limit: threshold of the indicator for a warning.
     """
     lost = numbers[TRUNCATED] + abs(numbers[LOST_AT_START + KINETIC] + numbers[LOST_AT_START + STRAIN])
-    given, defects = abs(numbers[GIVEN_ENERGY] + numbers[GIVEN_POTENTIAL]), numbers[DEFECTS]
-    looked = numbers[LOOKED] == SAMPLES and numbers[LOOK_END] == end
+    start_energy, defects = abs(numbers[GIVEN_ENERGY] + numbers[GIVEN_POTENTIAL]), numbers[DEFECTS]
+    sampled = numbers[LOOKED] == SAMPLES and numbers[LOOK_END] == end
     numbers[VERDICT], numbers[VERDICT + 1] = 0.0, 0.0
-    if not lost <= ENERGY_SHARE * given:
-        largest = given if isolated == 1 else math.nan
-        if isolated == 0 and looked:
-            largest = max(given, numbers[LOOKED + 2])
-        numbers[VERDICT] = share_lost(lost, largest)
+    if not lost <= ENERGY_SHARE * start_energy:
+        largest = start_energy if isolated == 1 else math.nan
+        if isolated == 0 and sampled:
+            largest = max(start_energy, numbers[LOOKED + 2])
+        numbers[VERDICT] = lost_share(lost, largest)
     if not (defects <= 0.0 or is_small(defects, limit, numbers[GIVEN_SQUARE]) == 1):
-        error = indicator(defects, numbers[LOOKED + 1] if looked else math.nan)
+        error = indicator(defects, numbers[LOOKED + 1] if sampled else math.nan)
         numbers[VERDICT + 1] = 0.0 if error <= limit else error
 
 
 @compiled
-def share_lost(lost: float, largest: float) -> float:
-    """Of the largest energy [J] of a run; all of it where that is zero, as truncation has taken it at the start."""
+def lost_share(lost: float, largest: float) -> float:
+    """Return the share of energy lost in the largest energy [J] of a run, zero where it is below the threshold.
+
+    It is 1 where the largest energy is zero: truncation has then removed all of it at the start.
+    """
     if lost <= ENERGY_SHARE * largest:
         return 0.0
     return lost / largest if largest != 0.0 else 1.0
@@ -63,7 +66,7 @@ def share_lost(lost: float, largest: float) -> float:
 
 @compiled
 def indicator(lost: float, square: float) -> float:
-    """The truncation indicator of a sum of |defect|^2 and the mean of |y|^2."""
+    """Return the truncation indicator of a sum of |defect|^2 and the mean of |y|^2."""
     if square == 0.0:
         return math.inf if lost != 0.0 else 0.0
     return math.sqrt(lost / square)

@@ -1,8 +1,8 @@
-"""Several starts of one model carried to the end one after the other, by one call of the loop.
+"""Batch: several starts of one model, advanced to the end one after the other by one call of the loop.
 
-What Python does for a run takes as long as the loop does, and is done by one thread at a time; here it is done for many
-runs at once. A start that meets something on its way, a level that is not there yet, a full record, a failure, ends
-the call: whoever has asked carries that one by itself. So a run is what it is alone, to the bit.
+The Python part of a run takes as long as the loop, and only one thread at a time can do it; here it is done once for
+many runs. A start that lacks a level, fills the record or fails ends the call, and is then run alone. So every run is
+the same, to the bit, as a run alone.
 """
 
 from __future__ import annotations
@@ -22,22 +22,23 @@ from multiphi_exudyn.events.packing.level_arrays import LevelArrays
 from multiphi_exudyn.events.packing.start_arrays import Start, set_starts
 from multiphi_exudyn.mathematics.compiling.compiled import entry
 from multiphi_exudyn.time.loop.motion_size import INDICATOR, SAMPLES
-from multiphi_exudyn.time.loop.verdict import judge
-from multiphi_exudyn.time.many.batch_loop import ENDS, TOLD_WIDTH, carry_starts, measure_starts, sample_starts
-from multiphi_exudyn.time.record.loop_copies import EMPTY, PARTS, taken
+from multiphi_exudyn.time.loop.verdict import set_verdict
+from multiphi_exudyn.time.many.batch_loop import ENDS, RUN_WIDTH, advance_starts, measure_starts, sample_starts
+from multiphi_exudyn.time.record.loop_copies import EMPTY, PARTS, copy_record
 from multiphi_exudyn.time.run.motion import Motion
 
-__all__ = ["Several"]
+__all__ = ["Batch"]
 
-carry_several, sampled_several, measured_several = entry(carry_starts), entry(sample_starts), entry(measure_starts)
-judged = entry(judge)
+advance_batch, sample_batch, measure_batch = entry(advance_starts), entry(sample_starts), entry(measure_starts)
+compute_verdict = entry(set_verdict)
 
 
 @dataclass(frozen=True)
-class Several:
-    """Runs from ``starts`` on ``arrays``, of which the first ``count`` have come to the ``end`` [s].
+class Batch:
+    """Runs from ``starts`` on ``arrays``, of which the first ``count`` have reached the ``end`` [s].
 
-    call: calls a compiled function with what it is given. parts: their record. ends, told: see ``carry_starts``.
+    call: calls a compiled function with its arguments. parts: the record of the runs. ends, run_numbers: see
+    ``advance_starts``.
     """
 
     arrays: LevelArrays
@@ -47,33 +48,34 @@ class Several:
     count: int
     parts: dict[str, np.ndarray]
     ends: np.ndarray
-    told: np.ndarray
+    run_numbers: np.ndarray
 
     @classmethod
-    def carried(cls, motion: Motion, starts: Sequence[Start], end: float, call: Callable[..., Any]) -> Several:
-        """Starts carried to ``end`` [s]; motion: from the first of them, on whose arrays they are."""
+    def run(cls, motion: Motion, starts: Sequence[Start], end: float, call: Callable[..., Any]) -> Batch:
+        """Advance starts to ``end`` [s] on the arrays of ``motion``, which begins at the first of them."""
         arrays, count = motion.arrays, len(starts)
         motion.take_over()
         set_starts(arrays, starts)
-        fresh = arrays.numbers[:OF_A_RUN].copy()
-        ends, told = np.zeros((count + 1, ENDS), np.int64), np.empty((count, TOLD_WIDTH))
-        given = end, arrays.channels.first_end, fresh, count, ends.ravel(), told.ravel()
-        done = int(call(carry_several, *arrays.buffers.all, *given))
+        initial = arrays.numbers[:OF_A_RUN].copy()
+        ends, run_numbers = np.zeros((count + 1, ENDS), np.int64), np.empty((count, RUN_WIDTH))
+        arguments = end, arrays.channels.first_end, initial, count, ends.ravel(), run_numbers.ravel()
+        count_done = int(call(advance_batch, *arrays.buffers.all, *arguments))
         arrays.owner = None
         if (excitation := arrays.levels.excitation).pushes:  # each start has its own potential
-            told[:done, a.GIVEN_POTENTIAL] = [excitation.static.dot(start.displacement) for start in starts[:done]]
-            told[:done, a.VERDICT] = math.nan
-        return cls(arrays, starts, end, call, done, EMPTY | taken(arrays, PARTS), ends, told)
+            potentials = [excitation.static.dot(start.displacement) for start in starts[:count_done]]
+            run_numbers[:count_done, a.GIVEN_POTENTIAL] = potentials
+            run_numbers[:count_done, a.VERDICT] = math.nan
+        return cls(arrays, starts, end, call, count_done, EMPTY | copy_record(arrays, PARTS), ends, run_numbers)
 
     @property
     def events(self) -> np.ndarray:
-        """Their numbers (count,)."""
-        own = np.concatenate([[0], np.cumsum(self.parts["kinds"][:, 1] != a.SHARED)])
-        return np.diff(own[self.ends[: self.count + 1, 3]])
+        """Numbers of events of the runs (count,)."""
+        events_so_far = np.concatenate([[0], np.cumsum(self.parts["kinds"][:, 1] != a.SHARED)])
+        return np.diff(events_so_far[self.ends[: self.count + 1, 3]])
 
     @functools.cached_property
     def _numbers(self) -> list[int]:
-        """Of the levels of all segments."""
+        """Numbers of the levels of all segments."""
         numbers: list[int] = self.parts["rows"][:, 0].tolist()
         return numbers
 
@@ -83,34 +85,34 @@ class Several:
         return sorted(set(self._numbers))
 
     def visited(self, k: int) -> tuple[tuple[int, ...], ...]:
-        """The levels of a run, each once, by their states."""
+        """States of the levels of a run, each level once."""
         first, last = self._firsts[k], self._firsts[k + 1] - 1
         return tuple([self.arrays.loaded[n].states for n in dict.fromkeys(self._numbers[first:last])])
 
     @functools.cached_property
     def _firsts(self) -> list[int]:
-        """The first segments of all runs."""
+        """Index of the first segment of every run."""
         firsts: list[int] = self.ends[:, 0].tolist()
         return firsts
 
     @functools.cached_property
     def _record(self) -> tuple[np.ndarray, ...]:
-        """What compiled functions are given of the record, and where its levels stand, (levels,)."""
+        """Arrays of the record for compiled functions, with the places of its levels (levels,)."""
         offsets = np.zeros(self._visited[-1] + 1, np.int64)
         for number in self._visited:
             offsets[number] = self.arrays.level(self.arrays.loaded[number].states)
         parts = self.parts
         return parts["rows"].ravel(), parts["coordinates"], offsets, parts["instants"], self.ends.ravel()
 
-    def _asked(self, function: Callable[..., Any], *given: Any) -> None:
-        """Call a compiled function about the record until it has all that it needs."""
+    def _evaluate(self, function: Callable[..., Any], *given: Any) -> None:
+        """Call a compiled function of the record until it has all that it needs."""
         while self.call(function, *self.arrays.buffers.all, *self._record, *given) == NEED:
             self.arrays.supply()
 
     def values(self, rows: Callable[[LoadedLevel], Sequence[np.ndarray]], points: int, times: np.ndarray) -> np.ndarray:
         """Displacements (count, points, t) [m] at times (t,) [s]; rows: of all points in a level (level_rows.py)."""
-        found = np.empty((self.count, points, len(times)))
-        if found.size:
+        displacements = np.empty((self.count, points, len(times)))
+        if displacements.size:
             loaded = [(number, self.arrays.loaded[number]) for number in self._visited]
             levels, width = self._visited[-1] + 1, max(level.level.modes for _, level in loaded)
             functions = np.zeros((points, levels, 2 * width + 1))
@@ -118,48 +120,48 @@ class Several:
                 n = level.level.modes
                 for p, row in enumerate(rows(level)):
                     functions[p, number, :n], functions[p, number, -1] = row[:n], row[-1]
-            asked = functions.ravel(), levels, points, width, times, len(times)
-            self._asked(sampled_several, self.count, *asked, found.ravel())
-        return found
+            arguments = functions.ravel(), levels, points, width, times, len(times)
+            self._evaluate(sample_batch, self.count, *arguments, displacements.ravel())
+        return displacements
 
     def verdicts(self, runs: Sequence[int], limit: float) -> dict[int, tuple[float, float]]:
-        """What truncation took of some runs (verdict.py); limit: of the indicator, from which it is told."""
+        """Verdicts on the truncation of some runs (verdict.py); limit: threshold of the indicator for a warning."""
         if not self.arrays.ints[a.JUDGED]:
             return dict.fromkeys(runs, (0.0, 0.0))
-        asked = self._unjudged(runs) if limit == INDICATOR else runs
-        self._judge(asked, limit)
-        if further := self._unjudged(asked):
+        chosen = self._without_verdict(runs) if limit == INDICATOR else runs
+        self._compute_verdicts(chosen, limit)
+        if further := self._without_verdict(chosen):
             sizes = np.empty((len(further), 2))
-            self._asked(measured_several, np.array(further, np.int64), len(further), self.end, sizes.ravel())
-            self.told[further, a.LOOKED], self.told[further, a.LOOK_END] = SAMPLES, self.end
-            self.told[further, a.LOOKED + 1 : a.LOOKED + a.LOOK_WIDTH] = sizes
-            self._judge(further, limit)
-        found = self.told[:, a.VERDICT : a.VERDICT + 2].tolist()
-        return {k: (found[k][0], found[k][1]) for k in runs}
+            self._evaluate(measure_batch, np.array(further, np.int64), len(further), self.end, sizes.ravel())
+            self.run_numbers[further, a.LOOKED], self.run_numbers[further, a.LOOK_END] = SAMPLES, self.end
+            self.run_numbers[further, a.LOOKED + 1 : a.LOOKED + a.LOOK_WIDTH] = sizes
+            self._compute_verdicts(further, limit)
+        verdicts = self.run_numbers[:, a.VERDICT : a.VERDICT + 2].tolist()
+        return {k: (verdicts[k][0], verdicts[k][1]) for k in runs}
 
-    def _unjudged(self, runs: Sequence[int]) -> list[int]:
-        """Those of some runs whose verdict is not known."""
-        unknown = np.isnan(self.told[list(runs), a.VERDICT : a.VERDICT + 2]).any(axis=1).tolist()
+    def _without_verdict(self, runs: Sequence[int]) -> list[int]:
+        """Those of some runs whose verdict is not known yet."""
+        unknown = np.isnan(self.run_numbers[list(runs), a.VERDICT : a.VERDICT + 2]).any(axis=1).tolist()
         return [k for k, still in zip(runs, unknown, strict=True) if still]
 
-    def _judge(self, runs: Sequence[int], limit: float) -> None:
-        """The verdict on some runs."""
+    def _compute_verdicts(self, runs: Sequence[int], limit: float) -> None:
+        """Compute the verdicts on some runs."""
         isolated = int(self.arrays.ints[a.ISOLATED])
         for k in runs:
-            judged(self.told[k], isolated, limit, self.end)
+            compute_verdict(self.run_numbers[k], isolated, limit, self.end)
 
     def has_defects(self, k: int) -> bool:
         """Whether all defects of a run are known."""
-        return not math.isnan(self.told[k, a.DEFECTS])
+        return not math.isnan(self.run_numbers[k, a.DEFECTS])
 
     def struck(self, k: int) -> bool:
         """Whether a rigid contact was struck in a run."""
-        own = slice(self.ends[k, 5], self.ends[k + 1, 5])
-        events, impulses = self.parts["struck"][own], self.parts["impacts"][own, 0]
+        rows = slice(self.ends[k, 5], self.ends[k + 1, 5])
+        events, impulses = self.parts["struck"][rows], self.parts["impacts"][rows, 0]
         return bool(np.any(impulses[self.parts["kinds"][events, 1] != a.SHARED] > 0))
 
-    def land(self, k: int) -> Motion:
-        """The run as a motion that has come to the end."""
+    def motion(self, k: int) -> Motion:
+        """The k-th run as a motion that has reached the end."""
         (s, _, _, e, left, i), (s_end, _, _, e_end, left_end, i_end) = self.ends[k : k + 2].tolist()
         part = {name: given for name, given in self.parts.items() if name in ("coordinates", "phases")}
         part |= {"rows": self.parts["rows"][s:s_end].copy(), "instants": self.parts["instants"][s:s_end]}
@@ -169,5 +171,5 @@ class Several:
         if left_end > left:
             part["left_out"] = self.parts["left_out"][left:left_end] - s
         motion = Motion(self.arrays, self.starts[k])
-        motion.land(part, self.told[k])
+        motion.set_result(part, self.run_numbers[k])
         return motion

@@ -1,6 +1,7 @@
-"""Carrying: starts that stand in the arrays carried to the end one after the other, and looked at, by one call each.
+"""Batch loop: starts that are packed in the arrays, advanced to the end one after the other by one call.
 
-A start that meets something on its way, a level that is not there yet, a full record, a failure, ends the call.
+The samples and sizes of their motions take one call each. A start that lacks a level, fills the record or fails ends
+the call.
 """
 
 from __future__ import annotations
@@ -39,39 +40,40 @@ from multiphi_exudyn.time.loop.loop import advance
 from multiphi_exudyn.time.loop.loop_record import keep_segment
 from multiphi_exudyn.time.record.sampling import sample_rows, sample_sizes
 
-__all__ = ["ENDS", "TOLD_WIDTH", "carry_starts", "measure_starts", "sample_starts"]
+__all__ = ["ENDS", "RUN_WIDTH", "advance_starts", "measure_starts", "sample_starts"]
 
 ENDS = 6  # ints: segments, coordinates, phases, events, segments left out and impacts up to the end of a run
-TOLD_WIDTH = OF_A_RUN + 2
+RUN_WIDTH = OF_A_RUN + 2
 
 
 @compiled
-def carry_starts(
+def advance_starts(
     ints: Ints,
     numbers: Numbers,
     waves: Waves,
     end: float,
-    until: float,
-    fresh: Numbers,
+    first_piece_end: float,
+    initial: Numbers,
     count: int,
     ends: Ints,
-    told: Numbers,
+    run_numbers: Numbers,
 ) -> int:
-    """Carries the starts that stand in the arrays to ``end`` one after the other; how many of them have come there.
+    """Advance the packed starts to ``end`` [s] one after the other; return how many of them have reached it.
 
-    until: how long the first piece of the channels lasts. fresh: the numbers of a run at its start. ends: counts
-    (count + 1, ENDS) of the record, the first ones zero. told: numbers (count, TOLD_WIDTH) of each run, and its
-    function evaluations and transitions. A segment of no length after those of a run has its final state.
+    first_piece_end: end [s] of the first piece of the channels. initial: the numbers of a run at its start. ends:
+    counts (count + 1, ENDS) of the record, the first ones zero. run_numbers: numbers (count, RUN_WIDTH) of each
+    run, with its function evaluations and transitions. A segment of zero length after those of a run has its final
+    state.
     """
     for k in range(count):
         for i in range(OF_A_RUN):
-            numbers[i] = fresh[i]
+            numbers[i] = initial[i]
         ints[START], ints[STARTING], ints[STOP_AT_EVENT], ints[GIVEN_UP] = k, FRESH, 0, 0
         ints[DECISIONS], ints[TRANSITIONS], ints[PIECE] = 0, 0, 0
         numbers[ints[FOUND] + 1] = 0.0
         if ints[PRESCRIBED] > 0:
             load_piece(ints, waves)
-            set_drive(ints, numbers, waves, ints[DRIVE_NEXT], 0.0, numbers[TIME], until)
+            set_drive(ints, numbers, waves, ints[DRIVE_NEXT], 0.0, numbers[TIME], first_piece_end)
             keep_drive(ints, waves)
         status = advance(ints, numbers, waves, end)
         if status != END_REACHED or ints[SEGMENT_COUNT] >= ints[SEGMENT_ROOM]:
@@ -81,10 +83,10 @@ def carry_starts(
             ints[LEFT_OUT_COUNT], ints[IMPACT_COUNT] = ends[before + 4], ends[before + 5]
             return k
         for i in range(OF_A_RUN):
-            told[k * TOLD_WIDTH + i] = numbers[i]
-        told[k * TOLD_WIDTH + OF_A_RUN] = numbers[ints[FOUND] + 1]
-        told[k * TOLD_WIDTH + OF_A_RUN + 1] = ints[TRANSITIONS]
-        ints[SUMMED] = 1  # nothing works in no time
+            run_numbers[k * RUN_WIDTH + i] = numbers[i]
+        run_numbers[k * RUN_WIDTH + OF_A_RUN] = numbers[ints[FOUND] + 1]
+        run_numbers[k * RUN_WIDTH + OF_A_RUN + 1] = ints[TRANSITIONS]
+        ints[SUMMED] = 1  # no work in zero time
         keep_segment(ints, numbers, 0.0, numbers[HORIZON])
         after = ENDS * (k + 1)
         ends[after], ends[after + 1], ends[after + 2] = ints[SEGMENT_COUNT], ints[COORDINATE_COUNT], ints[PHASE_COUNT]
@@ -111,9 +113,9 @@ def sample_starts(
     count: int,
     values: Numbers,
 ) -> int:
-    """Values (runs, points, count) at times [s] in a record of ``carry_starts`` (sampling.py); OK or NEED.
+    """Put the values (runs, points, count) at times [s] of a record of ``advance_starts`` into ``values``.
 
-    functions: the points' rows (points, levels, 2 width + 1).
+    functions: the points' rows (points, levels, 2 width + 1), see sampling.py. Return OK or NEED.
     """
     for k in range(runs):
         for p in range(points):
@@ -137,14 +139,14 @@ def measure_starts(
     offsets: Ints,
     instants: Numbers,
     ends: Ints,
-    asked: Ints,
+    chosen: Ints,
     runs: int,
     end: float,
     sizes: Numbers,
 ) -> int:
-    """Mean of |y|^2 and largest energy (runs, 2) of those ``asked`` for, by ``sample_sizes``; OK or NEED."""
+    """Put mean |y|^2 and largest energy (runs, 2) of the ``chosen`` runs into ``sizes``; return OK or NEED."""
     for i in range(runs):
-        first, last = ends[ENDS * asked[i]], ends[ENDS * (asked[i] + 1)] - 1
+        first, last = ends[ENDS * chosen[i]], ends[ENDS * (chosen[i] + 1)] - 1
         status = sample_sizes(ints, numbers, waves, rows, coordinates, offsets, instants, first, last, end)
         if status == NEED:
             return NEED

@@ -1,8 +1,8 @@
 """Many runs of one model that differ in their starts alone, on all cores.
 
-A thread has arrays of its own, on which several runs at a time are carried to their ends (batch.py); levels are built
-once, for all. The compiled loop lets other threads go on, and everything else of a run is done by one thread at a time,
-so a run is what it is alone, to the bit, however many threads there are. What is not asked for is not kept.
+A thread has arrays of its own, on which a batch of runs at a time advances to the end (batch.py); levels are built
+once, for all. Other threads run during the compiled loop; everything else is done by one thread at a time, so every run
+is the same, to the bit, as a run alone, for any number of threads. Only the requested samples of a run are kept.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ class ManyRuns:
     times : array (t,)
         [s].
     samples : array (k, p, t)
-        Displacements of the points [m] at the times, NaN from where a run has failed.
+        Displacements of the points [m] at the times, NaN after the failure of a run.
     events : array (k,)
-        Their numbers.
+        Number of events of each run.
     ends : array (k,)
-        How far each came [s].
+        End of each run [s].
     status : tuple of str
         "ok" or "failed" of each.
     messages : tuple of str
@@ -105,8 +105,8 @@ def simulate_many(
     times : array (t,), default None
         At which they are [s], None for the end alone.
     threads : int, default None
-        How many; the answer does not hang on it. None for as many as there are cores, and one where the loop is plain
-        Python: all but the compiled loop is done by one thread at a time.
+        Number of threads, without effect on the answer. None for the number of cores, and for one where the loop is
+        plain Python: all but the compiled loop is done by one thread at a time.
 
     Returns
     -------
@@ -140,12 +140,12 @@ def simulate_many(
     wider = holding(model, loads)
     rows = [(isinstance(point, (str, Mapping)), model.structure.row(point)) for point in points]
     outside = [sentence for named, row in rows if not named for sentence in row_warnings(wider, row)]
-    Excitation.of(wider, loads, end)  # what is wrong with a load is so for all runs
+    Excitation.of(wider, loads, end)  # refuses loads that are wrong for all runs
     given = Run(wider, end, loads=loads)
     task = Task(given, starts, [row for _, row in rows], _times(times, end))
     with tqdm(total=len(starts), unit="run", disable=None, leave=False, delay=BAR_DELAY) as bar:
         task.carry_out(_checked(threads), bar)
-    status, messages, warnings = zip(*task.told, strict=True)
+    status, messages, warnings = zip(*task.results, strict=True)
     groups = grouped((str(number), sentences) for number, sentences in enumerate(warnings))
     issue((*outside, *(group.told(len(starts)) for group in groups)))
     return ManyRuns(tuple(points), task.times, task.samples, task.events, task.ends, status, messages, warnings)
@@ -155,15 +155,15 @@ def _starts(model: MultiPhiModel, displacements: Any, velocities: Any) -> list[S
     """x and x' of every start."""
     n, needed = model.structure.n, "a (k, n) array of real numbers"
     given = {"displacements": displacements, "velocities": velocities}
-    found = {name: real_array(name, values, needed) for name, values in given.items() if values is not None}
-    if not found:
+    arrays = {name: real_array(name, values, needed) for name, values in given.items() if values is not None}
+    if not arrays:
         raise MultiPhiTypeError(f"displacements: got None, and no velocities, need {needed}")
-    count = len(next(iter(found.values())))
-    for name, values in found.items():
+    count = len(next(iter(arrays.values())))
+    for name, values in arrays.items():
         if values.ndim != 2 or values.shape != (count, n) or not count:
             raise MultiPhiValueError(f"{name}: got shape {values.shape}, need (k, {n}), k the same for both")
     none = [None] * count
-    return list(zip(found.get("displacements", none), found.get("velocities", none), strict=True))
+    return list(zip(arrays.get("displacements", none), arrays.get("velocities", none), strict=True))
 
 
 def _times(given: Any, end: float) -> np.ndarray:

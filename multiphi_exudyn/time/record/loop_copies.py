@@ -1,4 +1,4 @@
-"""Taken: what the loop has recorded (loop_record.py), copied out of its arrays as it stands there."""
+"""Loop copies: the record of the loop (loop_record.py), copied out of its arrays."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.packing.level_arrays import LevelArrays
 
-__all__ = ["EMPTY", "EVENTS", "PARTS", "taken"]
+__all__ = ["EMPTY", "EVENTS", "PARTS", "copy_record"]
 
 EMPTY: dict[str, np.ndarray] = {  # numbers and places of segments and events: below 2**31 by RECORD_BYTES (motion.py)
     "rows": np.empty((0, a.SEGMENT_WIDTH), np.int32),
@@ -23,7 +23,7 @@ EMPTY: dict[str, np.ndarray] = {  # numbers and places of segments and events: b
     "impacts": np.empty((0, a.IMPACT_WIDTH)),
 }
 
-PARTS = (  # where in the loop's arrays they begin, how many rows there are, how wide: 0 for numbers alone
+PARTS = (  # name, slots of place and number of rows in the loop's arrays, width (0: a flat array)
     ("rows", a.SEGMENT_INTS, a.SEGMENT_COUNT, a.SEGMENT_WIDTH),
     ("instants", a.INSTANTS, a.SEGMENT_COUNT, 0),
     ("coordinates", a.COORDINATE_NUMBERS, a.COORDINATE_COUNT, 0),
@@ -35,22 +35,22 @@ PARTS = (  # where in the loop's arrays they begin, how many rows there are, how
     ("impacts", a.IMPACT_NUMBERS, a.IMPACT_COUNT, a.IMPACT_WIDTH),
 )
 EVENTS = PARTS[-4:]
-COUNTS = tuple({counted for _, _, counted, _ in PARTS})
-FIRST = a.SEGMENT_INTS  # of the slots that tell of a record
+COUNTS = tuple({count_slot for _, _, count_slot, _ in PARTS})
+FIRST_SLOT = a.SEGMENT_INTS  # of the record
 OF_NUMBERS = ("instants", "coordinates", "amounts", "impacts")
 
 
-def taken(arrays: LevelArrays, wanted: Sequence[tuple[str, int, int, int]]) -> dict[str, np.ndarray]:
-    """Copies of those of the ``wanted`` of ``PARTS`` that have rows; all of them are then empty in the arrays."""
+def copy_record(arrays: LevelArrays, parts: Sequence[tuple[str, int, int, int]]) -> dict[str, np.ndarray]:
+    """Copies of the ``parts`` (of ``PARTS``) that have rows; all parts are then empty in the arrays."""
     ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
-    slots, parts = ints[FIRST : a.IMPACT_COUNT + 1].tolist(), {}
-    for name, slot, counted, width in wanted:
-        if rows := slots[counted - FIRST]:
-            start, buffer = slots[slot - FIRST], numbers if name in OF_NUMBERS else ints
-            end = start + rows * (width or 1) + (name == "instants")  # they end with the last segment
-            part = parts[name] = buffer[start:end].astype(EMPTY[name].dtype)
+    slots, copies = ints[FIRST_SLOT : a.IMPACT_COUNT + 1].tolist(), {}
+    for name, slot, count_slot, width in parts:
+        if rows := slots[count_slot - FIRST_SLOT]:
+            start, buffer = slots[slot - FIRST_SLOT], numbers if name in OF_NUMBERS else ints
+            end = start + rows * (width or 1) + (name == "instants")  # one more than the segments: the last end
+            part = copies[name] = buffer[start:end].astype(EMPTY[name].dtype)
             if width:
                 part.shape = rows, width
     for slot in COUNTS:
         ints[slot] = 0
-    return parts
+    return copies

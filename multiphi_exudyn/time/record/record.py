@@ -1,4 +1,4 @@
-"""Record: what the loop has done, taken from its arrays, and the questions that many segments are asked together."""
+"""Record: segments and events of a run, copied from the loop's arrays, and values of many segments at once."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from multiphi_exudyn.events.transitions.exits import exits_of
 from multiphi_exudyn.events.transitions.state import Phase
 from multiphi_exudyn.mathematics.compiling.compiled import entry
 from multiphi_exudyn.mechanics.element import Element, ElementState
-from multiphi_exudyn.time.record.growing_array import Growing
-from multiphi_exudyn.time.record.loop_copies import EMPTY, EVENTS, PARTS, taken
+from multiphi_exudyn.time.record.growing_array import GrowingArray
+from multiphi_exudyn.time.record.loop_copies import EMPTY, EVENTS, PARTS, copy_record
 from multiphi_exudyn.time.record.sampling import sample_rows, sample_sizes, sample_states
 from multiphi_exudyn.time.record.work import integrate_works, work_waves
 from multiphi_exudyn.time.segments.segment import Segment, owners
@@ -30,10 +30,10 @@ PHASES = (Phase.ARMED, Phase.RECOVERING, Phase.REFUSED, Phase.HELD_BACK, Phase.L
 states_of, values_of, sizes_of = entry(sample_states), entry(sample_rows), entry(sample_sizes)
 works_of = entry(integrate_works)
 
-FEW = 2  # levels: of more it is looked for those that hold at the times asked for
+FEW = 2  # levels: of more, only those of the requested times are evaluated
 
 STILL = Drive(0.0, math.inf, ())  # no channel is a function of time
-UNDRIVEN = 1.0, 0.0, 0.0  # horizon, work and age then
+UNDRIVEN = 1.0, 0.0, 0.0  # horizon, work and age without such channels
 
 
 def _joined(name: str) -> property:
@@ -44,13 +44,13 @@ def _joined(name: str) -> property:
 class Record:
     """Segments and events of a run, in arrays that grow by parts.
 
-    levels: each once. rows (n, 4): number of the level in them, piece, where coordinates and phases stand (-1: all
-    armed). instants (n + 1,): starts, and the end of the last [s].
-    coordinates: of every start xi, xi'; where channels are functions of time horizon [s], work [J] at the start, since
-    when [s] its piece lasts; where some phases are not armed, when after it [s] the last of them was.
-    phases: of the starts at which some are not armed. left_out: places of segments whose works the loop has not summed.
-    kinds (m, 3): contact, state entered, or SHARED, state left. amounts (m, 3): time [s], two losses to truncation [J].
-    struck (p,): which of these have any of impacts (p, 5): impulse [N s], losses [J] by impact, as stop work, to
+    levels: each once. rows (n, 4): of every segment, number of its level, piece, places of its coordinates and phases
+    (-1: all armed). instants (n + 1,): starts of the segments and end of the last [s].
+    coordinates: xi, xi' at every start; with channels that are functions of time also horizon [s], work [J] at the
+    start and age [s] of the piece; with phases that are not armed also the delay [s] until the last of them is armed.
+    phases: at the starts where some are not armed. left_out: segments whose works the loop has not summed.
+    kinds (m, 3): contact, state entered (or SHARED), state left. amounts (m, 3): time [s], two truncation losses [J].
+    struck (p,): rows of these that have a row of impacts (p, 5): impulse [N s], losses [J] by impact, as stop work, to
     damping, to friction. arrays: those of the loop.
     """
 
@@ -59,23 +59,23 @@ class Record:
         self.count = self.left_out_count = 0  # of segments
         self.levels: list[LoadedLevel] = []
         self._numbers: dict[tuple[int, ...], int] = {}  # of the levels, by the states of their elements
-        self._parts: dict[str, Growing] = {}
-        self._last: dict[str, np.ndarray] = {}  # taken, and not among the parts yet
+        self._parts: dict[str, GrowingArray] = {}
+        self._last: dict[str, np.ndarray] = {}  # copied from the loop last, not yet added to the parts
 
     rows, instants, coordinates = _joined("rows"), _joined("instants"), _joined("coordinates")
     phases, left_out = _joined("phases"), _joined("left_out")
     kinds, amounts, struck, impacts = _joined("kinds"), _joined("amounts"), _joined("struck"), _joined("impacts")
 
-    def take(self) -> None:
-        """Take over what the loop has written."""
-        self.keep(taken(self.arrays, PARTS))
+    def collect(self) -> None:
+        """Move the loop's segments and events from its arrays to this record."""
+        self.append(copy_record(self.arrays, PARTS))
 
     def take_events(self) -> None:
-        """Take over the events of what the loop has written, and forget the rest."""
-        self.keep(taken(self.arrays, EVENTS))
+        """Move the loop's events from its arrays to this record, and drop its segments."""
+        self.append(copy_record(self.arrays, EVENTS))
 
-    def keep(self, part: dict[str, np.ndarray]) -> None:
-        """Add a part, as it stood in the loop's arrays."""
+    def append(self, part: dict[str, np.ndarray]) -> None:
+        """Append a part, numbered as in the loop's arrays."""
         if not part:
             return
         if self._last:
@@ -86,18 +86,18 @@ class Record:
             self.count += len(part["rows"])
             self.left_out_count += len(part.get("left_out", ()))
         if "kinds" in part:
-            vars(self).pop("places", None)
+            vars(self).pop("event_rows", None)
 
     @property
     def bytes(self) -> int:
-        """What it takes of memory."""
-        taken = [part.nbytes for part in self._last.values()]
+        """Memory of the record."""
+        sizes = [part.nbytes for part in self._last.values()]
         if self._parts:
-            taken += [part.bytes for part in self._parts.values()]
-        return sum(taken)
+            sizes += [part.bytes for part in self._parts.values()]
+        return sum(sizes)
 
     def whole(self, name: str) -> np.ndarray:
-        """An array: what was taken, where that was taken at once."""
+        """Return an array of the record as a whole."""
         if not self._parts:
             return self._last.get(name, EMPTY[name])
         if self._last:
@@ -107,12 +107,12 @@ class Record:
 
     @property
     def visited(self) -> tuple[tuple[int, ...], ...]:
-        """The levels by the states of their elements."""
+        """States of the elements of every visited level."""
         return tuple(self._numbers)
 
     @property
     def eventless(self) -> bool:
-        """Whether nothing has happened, as far as one sees without looking into it."""
+        """Whether there is certainly no event; False where only the arrays, once joined, would show it."""
         return not self._parts and "kinds" not in self._last
 
     def _add(self, part: dict[str, np.ndarray]) -> None:
@@ -125,36 +125,36 @@ class Record:
             if "struck" in part:
                 part["struck"] += parts["kinds"].count
             if parts["instants"].count and "instants" in part:
-                part["instants"] = part["instants"][1:]  # the first one is the end of what was there
+                part["instants"] = part["instants"][1:]  # the first one is the end of the earlier segments
         else:
-            self._parts = parts = {name: Growing(empty) for name, empty in EMPTY.items()}
-        for name, given in part.items():
-            parts[name].add(given)
+            self._parts = parts = {name: GrowingArray(empty) for name, empty in EMPTY.items()}
+        for name, array in part.items():
+            parts[name].add(array)
 
     def _renumber(self, numbers: np.ndarray) -> None:
-        """Numbers (k,) of levels in the arrays, which may have packed one twice, become those in this record."""
-        packed, known, other = numbers.tolist(), {}, False
+        """Replace numbers (k,) of levels in the arrays, where a level may be packed twice, by those in this record."""
+        packed, renumbered, differs = numbers.tolist(), {}, False
         for number in dict.fromkeys(packed):
             level = self.arrays.loaded[number]
-            own = known[number] = self._numbers.setdefault(level.states, len(self.levels))
-            if own == len(self.levels):
+            index = renumbered[number] = self._numbers.setdefault(level.states, len(self.levels))
+            if index == len(self.levels):
                 self.levels.append(level)
-            other = other or own != number
-        if other:
-            numbers[:] = [known[number] for number in packed]
+            differs = differs or index != number
+        if differs:
+            numbers[:] = [renumbered[number] for number in packed]
 
     @functools.cached_property
-    def places(self) -> np.ndarray:
-        """Which rows of kinds and amounts are events."""
+    def event_rows(self) -> np.ndarray:
+        """Indices of the rows of kinds and amounts that are events."""
         return np.flatnonzero(self.kinds[:, 1] != a.SHARED).astype(np.int32)
 
     @functools.cached_property
-    def told(self) -> list[tuple[str, tuple[ElementState, ...]]]:
-        """The name of every contact, and its states."""
+    def contact_states(self) -> list[tuple[str, tuple[ElementState, ...]]]:
+        """Name and states of every contact."""
         return [(contact.name, contact.states) for contact in self._contacts]
 
     def level(self, i: int) -> LoadedLevel:
-        """The level of the i-th segment."""
+        """Level of the i-th segment."""
         return self.levels[int(self.rows[i, 0])]
 
     def state(self, i: int) -> tuple[np.ndarray, np.ndarray]:
@@ -165,14 +165,14 @@ class Record:
     def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
         """xi and xi' (2, k, n) of the segments ``places`` (k,), times ``after`` (k,) [s] their starts.
 
-        n: the most coordinates of a level; those that a level has not are zero.
+        n: largest number of coordinates of a level; coordinates beyond those of a level are zero.
         """
         visited = sorted(set(self.rows[places, 0].tolist()))
         width = max((self.levels[number].level.modes for number in visited), default=0)
         result = np.zeros((2, len(places), width))
-        given = np.ascontiguousarray(places), np.ascontiguousarray(after), len(places), width, result.ravel()
+        arguments = np.ascontiguousarray(places), np.ascontiguousarray(after), len(places), width, result.ravel()
         for offsets in self._packed(visited):
-            while self._supply(states_of(*self._given(offsets), *given)):
+            while self._supply(states_of(*self._record_arguments(offsets), *arguments)):
                 pass
         return result
 
@@ -188,54 +188,55 @@ class Record:
             function, n = row(self.levels[number]), self.levels[number].level.modes
             functions[number, :n], functions[number, width : width + n] = function[:n], function[n : 2 * n]
             functions[number, -1] = function[-1]
-        asked = functions.ravel(), 0, width, np.ascontiguousarray(times), len(times), int(side == "left"), result, 0
+        at = np.ascontiguousarray(times), len(times), int(side == "left")
+        arguments = self.instants, 0, len(self.rows), functions.ravel(), 0, width, *at, result, 0
         for offsets in self._packed(visited):
-            while self._supply(values_of(*self._given(offsets), self.instants, 0, len(self.rows), *asked)):
+            while self._supply(values_of(*self._record_arguments(offsets), *arguments)):
                 pass
         return result
 
     def sizes(self, end: float) -> tuple[float, float]:
-        """Mean of |y|^2 and largest energy up to ``end`` [s], see ``Segments``."""
+        """Mean of |y|^2 [m2 kg] and largest energy [J] up to ``end`` [s], see ``Segments``."""
         square, largest = 0.0, 0.0
         for offsets in self._packed(list(range(len(self.levels)))):
-            while self._supply(sizes_of(*self._given(offsets), self.instants, 0, len(self.rows), end)):
+            while self._supply(sizes_of(*self._record_arguments(offsets), self.instants, 0, len(self.rows), end)):
                 pass
             square += float(self.arrays.numbers[a.SEEN + 1])
             largest = max(largest, float(self.arrays.numbers[a.SEEN + 2]))
         return square, largest
 
     def works(self, places: np.ndarray) -> tuple[float, float, float]:
-        """Work [J] of damping, of what varies, jumps at their starts included, and of friction in segments (k,)."""
+        """Work [J] of damping, of varying loads, jumps at the starts included, and of friction in segments (k,)."""
         total = np.zeros(3)
         for offsets in self._packed(np.unique(self.rows[places, 0]).tolist()):
             for level in offsets[offsets > 0].tolist():
                 self.arrays.add_powers(level)
             works = np.zeros(3)
-            asked = self.instants, places, len(places), self._work_memory(), works
-            while self._supply(works_of(*self._given(offsets), *asked)):
+            arguments = self.instants, places, len(places), self._work_memory(), works
+            while self._supply(works_of(*self._record_arguments(offsets), *arguments)):
                 works[:] = 0.0
             total += works
         damping, varying, friction = total.tolist()
-        return damping, varying, friction - self._followed(places)
+        return damping, varying, friction - self._spring_energy(places)
 
-    def _followed(self, places: np.ndarray) -> float:
-        """What springs have taken up [J] in segments (k,) in which their stretch goes with the force of a link."""
-        given, total = [level.potential_form.follows for level in self.levels], 0.0
-        for number in (k for k in np.unique(self.rows[places, 0]) if len(given[k])):
-            own, n = places[self.rows[places, 0] == number], given[number].shape[1] - 1
-            for sign, after in ((-1, np.zeros(len(own))), (1, self.instants[own + 1] - self.instants[own])):
-                x = self.states(own, after)[0][:, :n]
-                total += sign * 0.5 * float(np.sum((x @ given[number][:, :-1].T + given[number][:, -1]) ** 2))
+    def _spring_energy(self, places: np.ndarray) -> float:
+        """Energy [J] taken up by springs in segments (k,) in which their stretch follows the force of a link."""
+        rows, total = [level.potential_form.follows for level in self.levels], 0.0
+        for number in (k for k in np.unique(self.rows[places, 0]) if len(rows[k])):
+            chosen, n = places[self.rows[places, 0] == number], rows[number].shape[1] - 1
+            for sign, after in ((-1, np.zeros(len(chosen))), (1, self.instants[chosen + 1] - self.instants[chosen])):
+                x = self.states(chosen, after)[0][:, :n]
+                total += sign * 0.5 * float(np.sum((x @ rows[number][:, :-1].T + rows[number][:, -1]) ** 2))
         return total
 
     def _work_memory(self) -> np.ndarray:
-        """Memory for the work of a segment."""
+        """Scratch memory for the work of a segment."""
         pairs = sum(any(state.rubs for state in contact.states) for contact in self._contacts)
         room, q = self.arrays.scratch, int(self.arrays.ints[a.CHANNELS])
         return self.arrays.memory(work_waves(room.coordinates, room.exponentials, q, pairs))
 
     def _packed(self, visited: list[int]) -> Iterator[np.ndarray]:
-        """Where levels with these numbers stand in the arrays, (levels,), as many at a time as there is room for."""
+        """Places (levels,) in the arrays of levels with these numbers, as many at a time as there is room for."""
         while visited:
             if self.arrays.full:
                 self.arrays.forget()
@@ -245,24 +246,24 @@ class Record:
                 offsets[number] = self.arrays.level(self.levels[number].states)
             yield offsets
 
-    def _given(self, offsets: np.ndarray) -> tuple[np.ndarray, ...]:
-        """What every entry of sampling.py and work.py is given first."""
+    def _record_arguments(self, offsets: np.ndarray) -> tuple[np.ndarray, ...]:
+        """First arguments of every compiled function of sampling.py and work.py."""
         return *self.arrays.lent(int(self.rows[-1, 1])), self.rows.ravel(), self.coordinates, offsets
 
     def _supply(self, answer: int) -> bool:
-        """Whether an entry needs something, which it then has when it is called again."""
+        """Supply what a compiled function needs; return whether it is to be called again."""
         if answer == a.NEED:
             self.arrays.supply()
         return answer == a.NEED
 
-    def standing(self, i: int) -> tuple[Phase, ...]:
-        """The phases at the start of the i-th segment."""
+    def phases_at_start(self, i: int) -> tuple[Phase, ...]:
+        """Phases at the start of the i-th segment."""
         level, start = self.level(i), self.rows[i, 3]
         armed = (Phase.ARMED,) * len(exits_of(level))
         return armed if start < 0 else tuple(PHASES[k] for k in self.phases[start : start + len(armed)])
 
     def standings(self) -> np.ndarray:
-        """The phases (n, e), in numbers, at the start of every segment; e: the most exits of a level."""
+        """Phases (n, e), in numbers, at the start of every segment; e: largest number of exits of a level."""
         counts = np.array([len(exits_of(level)) for level in self.levels], np.int64)[self.rows[:, 0]]
         numbers, starts = np.zeros((len(self.rows), int(np.max(counts, initial=0))), np.int64), self.rows[:, 3]
         for count in np.unique(counts[starts >= 0]).tolist():
@@ -271,17 +272,17 @@ class Record:
         return numbers
 
     def segment(self, i: int) -> Segment:
-        """The i-th segment."""
+        """Return the i-th segment."""
         level, (start, end) = self.level(i), self.instants[i : i + 2].tolist()
         xi, xi_t = self.state(i)
-        horizon, work, age, armed_at = self._beside(i)
+        horizon, work, age, armed_at = self._start_values(i)
         held = xi[level.modal.modes + level.excitation.prescribed :]
         drive = self.arrays.channels.drive(self.rows[i, 1]).after(age) if level.excitation.prescribed else STILL
         flow = Flow.of(level, xi, xi_t, drive.beside(held), horizon)
-        return Segment(start, end, level, flow, self.standing(i), armed_at, work)
+        return Segment(start, end, level, flow, self.phases_at_start(i), armed_at, work)
 
-    def _beside(self, i: int) -> tuple[float, float, float, float]:
-        """Of the i-th start: horizon, work, since when its piece lasts, when the last phase was armed after it."""
+    def _start_values(self, i: int) -> tuple[float, float, float, float]:
+        """Horizon [s], work [J], age of the piece [s] at the i-th start, and delay [s] until all are armed."""
         level, (*_, start, phases) = self.level(i), self.rows[i].tolist()
         place, driven = start + 2 * level.level.modes, UNDRIVEN
         if level.excitation.prescribed:

@@ -1,4 +1,4 @@
-"""Segments and events of a record, which are made when somebody looks at them."""
+"""Recorded segments and events: sequences that make each object when it is first read."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ __all__ = ["Events", "Recorded"]
 T = TypeVar("T")
 
 
-class Made(Sequence[T], Generic[T]):
-    """A sequence of objects that are made one by one when they are asked for; compares like a tuple."""
+class LazySequence(Sequence[T], Generic[T]):
+    """Sequence whose objects are made one by one when they are read; compares like a tuple."""
 
     _make: Callable[[int], T]
     _count: int
-    _known: dict[int, T]
+    _made: dict[int, T]
 
     def __len__(self) -> int:
         return self._count
@@ -37,12 +37,12 @@ class Made(Sequence[T], Generic[T]):
     def __getitem__(self, index: slice) -> tuple[T, ...]: ...
     def __getitem__(self, index: int | slice) -> T | tuple[T, ...]:
         positions = range(self._count)[index]
-        return self._one(positions) if isinstance(positions, int) else tuple(map(self._one, positions))
+        return self._object(positions) if isinstance(positions, int) else tuple(map(self._object, positions))
 
-    def _one(self, i: int) -> T:
-        if i not in self._known:
-            self._known[i] = self._make(i)
-        return self._known[i]
+    def _object(self, i: int) -> T:
+        if i not in self._made:
+            self._made[i] = self._make(i)
+        return self._made[i]
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Sequence) and tuple(self) == tuple(other)
@@ -53,10 +53,10 @@ class Made(Sequence[T], Generic[T]):
         return repr(tuple(self))
 
 
-class Recorded(Made[Segment], Segments):
-    """The segments of a record so far, which is looked into when somebody asks; defects, truncated: see Segments.
+class Recorded(LazySequence[Segment], Segments):
+    """The segments of a record so far; defects, truncated: see Segments.
 
-    summed: works [J] of all that the record does not list as left out.
+    summed: works [J] of all segments that the record does not list as left out.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class Recorded(Made[Segment], Segments):
         summed: tuple[float, float, float],
         verdict: tuple[float, float] = Segments.verdict,
     ) -> None:
-        self._make, self._count, self._known = record.segment, record.count, {}
+        self._make, self._count, self._made = record.segment, record.count, {}
         self._record, self.arrays = record, record.arrays
         self.defects, self.truncated, self.verdict = defects, truncated, verdict
         self._summed, self._left_out = summed, record.left_out_count
@@ -136,39 +136,39 @@ class Recorded(Made[Segment], Segments):
 
     @functools.cached_property
     def _completed(self) -> tuple[float, float, float]:
-        """The works with those of the segments that were left out."""
+        """The works, those of the segments that were left out included."""
         damping, varying, friction = self._summed
         further = self._record.works(self._record.left_out[: self._left_out])
         return damping + further[0], varying + further[1], friction + further[2]
 
 
-class Events(Made[Event]):
-    """The events of a record so far; lost (6,): the energies [J] that left at all of them."""
+class Events(LazySequence[Event]):
+    """The events of a record so far; lost (6,): energies [J] lost at all of them."""
 
     def __init__(self, record: Record, lost: np.ndarray) -> None:
-        self._count, self._known = 0 if record.eventless else len(record.places), {}
+        self._count, self._made = 0 if record.eventless else len(record.event_rows), {}
         self._record, self._lost = record, lost
 
     @property
     def loss(self) -> Loss:
-        """The energies [J] that left at all of them."""
+        """Energies [J] lost at all events."""
         return Loss(*self._lost.tolist())
 
     def impulse(self, contact: str, first: float, last: float) -> float:
-        """What a contact was struck with [N s] in [first, last] [s], impacts of others included."""
-        names, times = [name for name, _ in self._record.told], self._record.amounts[:, 0]
-        own = (self._record.kinds[:, 0] == names.index(contact)) & (times >= first) & (times <= last)
-        return float(self._impulses[own].sum())
+        """Impulse [N s] on a contact in [first, last] [s], impacts of other contacts included."""
+        names, times = [name for name, _ in self._record.contact_states], self._record.amounts[:, 0]
+        is_impact = (self._record.kinds[:, 0] == names.index(contact)) & (times >= first) & (times <= last)
+        return float(self._impulses[is_impact].sum())
 
     def table(self) -> np.ndarray:
         """Time [s], position of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4)."""
-        places, amounts = self._record.places, self._record.amounts
+        places, amounts = self._record.event_rows, self._record.amounts
         time, truncation = amounts[places, 0], amounts[places, 1] + amounts[places, 2]
         return np.column_stack([time, self._record.kinds[places, 0], self._impulses[places], truncation])
 
     @property
     def _impulses(self) -> np.ndarray:
-        """Of every row of kinds (m,) [N s]."""
+        """Impulse [N s] of every row of kinds (m,)."""
         impulses = np.zeros(len(self._record.kinds))
         impulses[self._record.struck] = self._record.impacts[:, 0]
         return impulses
@@ -179,18 +179,18 @@ class Events(Made[Event]):
         k = bisect.bisect_left(struck, place)
         if k == len(struck) or struck[k] != place:
             return [0.0] * a.IMPACT_WIDTH
-        found: list[float] = self._record.impacts[k].tolist()
-        return found
+        row: list[float] = self._record.impacts[k].tolist()
+        return row
 
     def _make(self, i: int) -> Event:
         """The i-th event."""
-        record, told = self._record, self._record.told
-        place = int(record.places[i])
-        before = int(record.places[i - 1]) + 1 if i else 0
+        record, contacts = self._record, self._record.contact_states
+        place = int(record.event_rows[i])
+        before = int(record.event_rows[i - 1]) + 1 if i else 0
         time, kinetic, strain = record.amounts[place].tolist()
         impulse, impact, stop_work, damping, friction = self._impact(place)
         contact, entered, left = record.kinds[place].tolist()
-        shared = tuple((told[record.kinds[k, 0]][0], self._impact(k)[0]) for k in range(before, place))
-        name, states = told[contact]
+        shared = tuple((contacts[record.kinds[k, 0]][0], self._impact(k)[0]) for k in range(before, place))
+        name, states = contacts[contact]
         kind, loss = event_kind(states, left, entered), Loss(impact, kinetic, strain, stop_work, damping, friction)
         return Event(time, name, kind, loss, impulse, shared, states[entered].name)

@@ -1,10 +1,10 @@
-"""Sampling: recorded segments at times in them, by the flow that the loop goes by (events/flow.py).
+"""Sampling: values of recorded segments at given times, from the same flow as in the loop (events/flow.py).
 
-A segment is known by the state at its start: xi, xi', the piece of the channels and how far into it, and the horizon
-of its powers of time; they stand in the arrays of a record (record.py), and where its level stands in the ints in
-``offsets`` (levels,), 0 where it is not packed: those segments are left out.
+A segment is recorded by the state at its start: xi, xi', the piece of the channels and the time in it, and the horizon
+of its powers of time (record.py). ``offsets`` (levels,) are the places of the levels in the ints, 0 where a level is
+not packed: the segments of that level are skipped.
 
-On times that are evenly spaced, exp(lambda t) goes on by a factor, and begins anew from its exact value after a few.
+At evenly spaced times exp(lambda t) is multiplied by a constant factor, and computed exactly every few samples.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ from multiphi_exudyn.events.states.flow import state_at
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Shorts, Waves, compiled
 from multiphi_exudyn.mathematics.response.basis_arrays import POWERS, SCALES, differentiate, exponentials
 from multiphi_exudyn.mathematics.response.response_arrays import SHAPES
-from multiphi_exudyn.time.loop.motion_size import SAMPLES, see
-from multiphi_exudyn.time.record.segment_restart import resume
+from multiphi_exudyn.time.loop.motion_size import SAMPLES, add_sample_at
+from multiphi_exudyn.time.record.segment_restart import restart_segment
 
 __all__ = ["sample_rows", "sample_sizes", "sample_states"]
 
-RESTART = 32  # samples after which exponentials begin anew: as many round-offs
+RESTART = 32  # samples between exact exponentials: so many round-offs add up
 EVEN = 4e-16  # of the last time, by which evenly spaced times may be off
 
 
@@ -63,21 +63,21 @@ def sample_states(
     width: int,
     states: Numbers,
 ) -> int:
-    """xi and xi' (2, count, width) of the segments ``places`` (count,), times ``after`` [s] their starts.
+    """Put xi and xi' of the segments ``places`` (count,), ``after`` [s] their starts, into ``states``.
 
-    OK, or NEED where there is no room for a response.
+    states: (2, count, width). Return OK, or NEED where there is no room for a response.
     """
-    flowing = -1
+    expanded = -1
     for k in range(count):
         i, t = places[k], after[k]
         level, start = offsets[rows[i * SEGMENT_WIDTH]], rows[i * SEGMENT_WIDTH + 2]
         if level == 0:
             continue
         n, x, v = ints[level + MODES] + ints[CHANNELS], ints[AFTER + PLACE], ints[AFTER + SPEED]
-        if t != 0.0 and flowing != i:
-            if resume(ints, numbers, waves, rows, coordinates, offsets, i, 1.0) == NEED:
+        if t != 0.0 and expanded != i:
+            if restart_segment(ints, numbers, waves, rows, coordinates, offsets, i, 1.0) == NEED:
                 return NEED
-            flowing = i
+            expanded = i
         if t != 0.0:
             state_at(ints, numbers, waves, level, t, x, v)
         for c in range(n):
@@ -106,27 +106,27 @@ def sample_rows(
     values: Numbers,
     result: int,
 ) -> int:
-    """Values (count,) at times [s] of what is row.(xi, xi', 1) in every level, at an event from the left or the right.
+    """Put row.(xi, xi', 1) (count,) at times [s] into ``values``, at an event its limit from the left or the right.
 
-    Of the segments from ``first`` before ``segments``. function: where the rows (levels, 2 width + 1) stand, in the
-    order of offsets. result: where values begin. OK or NEED.
+    Of the segments from ``first`` before ``segments``. function: place of the rows (levels, 2 width + 1), in the order
+    of offsets. result: place of the first value. Return OK or NEED.
     """
     i, k, step = -1, 0, even_step(times, count)
     while k < count:
-        i = owner_of(instants, first, segments, times[k], left, i)
+        i = segment_at(instants, first, segments, times[k], left, i)
         level, last = offsets[rows[i * SEGMENT_WIDTH]], k + 1
-        until = instants[i + 1] if i + 1 < segments else math.inf
-        while last < count and times[k] < times[last] < until:
+        segment_end = instants[i + 1] if i + 1 < segments else math.inf
+        while last < count and times[k] < times[last] < segment_end:
             last += 1
         if level > 0:
-            if resume(ints, numbers, waves, rows, coordinates, offsets, i, 1.0) == NEED:
+            if restart_segment(ints, numbers, waves, rows, coordinates, offsets, i, 1.0) == NEED:
                 return NEED
-            began, row = instants[i], function + rows[i * SEGMENT_WIDTH] * (2 * width + 1)
-            weigh(ints, numbers, waves, level, functions, row, width)
+            segment_start, row = instants[i], function + rows[i * SEGMENT_WIDTH] * (2 * width + 1)
+            list_signal_coefficients(ints, numbers, waves, level, functions, row, width)
             constant, n = functions[row + 2 * width], ints[level + MODES] + ints[CHANNELS]
-            for held in range(n - ints[CHANNELS] + ints[PRESCRIBED], n):
-                constant += functions[row + held] * numbers[ints[AFTER + PLACE] + held]
-            sample_flow(ints, numbers, waves, began, constant, times, k, last, step, values, result)
+            for index in range(n - ints[CHANNELS] + ints[PRESCRIBED], n):
+                constant += functions[row + index] * numbers[ints[AFTER + PLACE] + index]
+            sample_flow(ints, numbers, waves, segment_start, constant, times, k, last, step, values, result)
         k = last
     return OK
 
@@ -144,32 +144,34 @@ def sample_sizes(
     segments: int,
     end: float,
 ) -> int:
-    """SEEN: how many of SAMPLES even instants from the first start to ``end`` [s], mean of |y|^2, largest energy.
+    """Set SEEN from SAMPLES even instants up to ``end`` [s]: number of samples, mean |y|^2, largest energy.
 
-    Of the segments from ``begin`` before ``segments``. OK or NEED.
+    Of the segments from ``begin`` before ``segments``. Return OK or NEED.
     """
-    i, flowing, first = -1, -1, instants[begin]
+    i, expanded, first = -1, -1, instants[begin]
     for part in range(LOOK_WIDTH):
         numbers[SEEN + part] = 0.0
     for k in range(SAMPLES):
         t = end if k == SAMPLES - 1 else first + (end - first) * k / (SAMPLES - 1)
-        i = owner_of(instants, begin, segments, t, 0, i)
+        i = segment_at(instants, begin, segments, t, 0, i)
         level = offsets[rows[i * SEGMENT_WIDTH]]
         if level == 0:
             continue
         if ints[level + SIZES] == 0:
             ints[NEEDED], ints[NEEDED_FROM] = NEED_SIZES, level
             return NEED
-        if flowing != i and resume(ints, numbers, waves, rows, coordinates, offsets, i, 1.0) == NEED:
+        if expanded != i and restart_segment(ints, numbers, waves, rows, coordinates, offsets, i, 1.0) == NEED:
             return NEED
-        flowing, weight = i, 0.5 if k == 0 or k == SAMPLES - 1 else 1.0
-        see(ints, numbers, waves, level, t - instants[i], weight)
+        expanded, weight = i, 0.5 if k == 0 or k == SAMPLES - 1 else 1.0
+        add_sample_at(ints, numbers, waves, level, t - instants[i], weight)
     return OK
 
 
 @compiled
-def weigh(ints: Ints, numbers: Numbers, waves: Waves, level: int, functions: Numbers, row: int, width: int) -> None:
-    """SIGNALS: coefficients (p,) on the flow of a row over xi, xi'."""
+def list_signal_coefficients(
+    ints: Ints, numbers: Numbers, waves: Waves, level: int, functions: Numbers, row: int, width: int
+) -> None:
+    """Set SIGNALS: coefficients (p,) on the flow of a row over xi, xi'."""
     r, c, result, free = ints[level + MODES], ints[FLOW_WAVES], ints[SIGNALS], ints[FLOW_FREE]
     n, rate, count = r + ints[PRESCRIBED], ints[WORK_WAVES], ints[FLOW_COUNT]
     for j in range(count):
@@ -193,7 +195,7 @@ def sample_flow(
     ints: Ints,
     numbers: Numbers,
     waves: Waves,
-    began: float,
+    segment_start: float,
     constant: float,
     times: Numbers,
     first: int,
@@ -202,14 +204,14 @@ def sample_flow(
     values: Numbers,
     result: int,
 ) -> None:
-    """Values from ``first`` before ``last`` of a constant and SIGNALS on the flow of a segment that ``began`` [s]."""
+    """Put a constant plus SIGNALS on the flow of a segment into ``values``, from ``first`` before ``last``."""
     basis, p, phi, c = ints[FLOW_BASIS], ints[FLOW_COUNT], ints[WORK_WAVES], ints[SIGNALS]
     powers, factors, unit = ints[basis + POWERS], ints[WORK_WAVES] + p, numbers[ints[basis + SCALES]]
     even = step > 0.0 and last - first > 1
     if even:
         exponentials(ints, numbers, waves, basis, step, 1.0, factors)
     for k in range(first, last):
-        t, value = times[k] - began, constant
+        t, value = times[k] - segment_start, constant
         if not even or (k - first) % RESTART == 0:
             exponentials(ints, numbers, waves, basis, t, t, phi)
         else:
@@ -234,8 +236,11 @@ def even_step(times: Numbers, count: int) -> float:
 
 
 @compiled
-def owner_of(instants: Numbers, first: int, segments: int, t: float, left: int, near: int) -> int:
-    """The last segment that begins at a time [s] or before, from the left the last before it; at least the first."""
+def segment_at(instants: Numbers, first: int, segments: int, t: float, left: int, near: int) -> int:
+    """Return the last segment that begins at t [s] or before; from the left the last before t; at least the first.
+
+    near: a segment to begin the search with, -1 for none.
+    """
     low, high = first, segments
     if near >= 0 and instants[near] < t:
         low, high = near, min(near + 2, segments)

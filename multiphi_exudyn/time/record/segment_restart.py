@@ -1,6 +1,6 @@
-"""Resuming: the flow of a recorded segment in flat arrays once more, from the state at its start.
+"""Segment restart: the flow of a recorded segment in flat arrays once more, from the state at its start.
 
-Its channels go on from their piece; the horizon of its powers of time is the one it had, or a longer one.
+Its channels continue in their piece; the horizon of its powers of time is the recorded one, or a longer one.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from multiphi_exudyn.mathematics.response.basis_arrays import RATES, SIZE
 from multiphi_exudyn.mathematics.response.forced_response import NEAREST_FAR, PER_DEGREE
 from multiphi_exudyn.mathematics.response.response_arrays import FREE
 
-__all__ = ["resume"]
+__all__ = ["restart_segment"]
 
 
 @compiled
-def resume(
+def restart_segment(
     ints: Ints,
     numbers: Numbers,
     waves: Waves,
@@ -49,11 +49,11 @@ def resume(
     coordinates: Numbers,
     offsets: Ints,
     i: int,
-    widest: float,
+    largest_factor: float,
 ) -> int:
-    """The flow of the i-th segment; OK, or NEED where there is no room for a response.
+    """Set up the flow of the i-th segment; return OK, or NEED where there is no room for a response.
 
-    widest: by how much its horizon may be longer than it was, for a response of fewer terms.
+    largest_factor: how many times its recorded horizon the new one may be, for a response of fewer terms.
     """
     segment, level = i * SEGMENT_WIDTH, offsets[rows[i * SEGMENT_WIDTH]]
     n, start = ints[level + MODES] + ints[CHANNELS], rows[segment + 2]
@@ -66,7 +66,7 @@ def resume(
         load_piece(ints, waves)
         set_drive(ints, numbers, waves, ints[DRIVE_NEXT], coordinates[start + 2 * n + 2], 0.0, 1.0)
         numbers[HORIZON] = coordinates[start + 2 * n]
-        numbers[HORIZON] *= widened(ints, numbers, waves, ints[level + RESPONSE], widest)
+        numbers[HORIZON] *= horizon_factor(ints, numbers, waves, ints[level + RESPONSE], largest_factor)
     expand(ints, numbers, waves, AFTER)
     if ints[FORCED_WANTED] > ints[FORCED_ROOM]:
         ints[NEEDED] = NEED_ROOM
@@ -75,14 +75,14 @@ def resume(
 
 
 @compiled
-def widened(ints: Ints, numbers: Numbers, waves: Waves, response: int, widest: float) -> float:
-    """By which power of two a horizon is to be longer for all poles to be far from the rates of the present piece.
+def horizon_factor(ints: Ints, numbers: Numbers, waves: Waves, response: int, largest_factor: float) -> float:
+    """Power of two by which the horizon is to be longer for all poles to be far from the rates of the present piece.
 
-    The response has no more powers of time than the piece then, and loses as many digits of what a piece of the first
-    horizon adds to the motion. One where ``widest`` would not do.
+    The response then has no more powers of time than the piece; the price is as many digits of what the piece adds to
+    the motion in its first horizon. The factor is 1 where ``largest_factor`` is too small for that.
     """
     free, piece, nearest, degree, factor = ints[response + FREE], ints[PIECE_NOW], math.inf, 0, 1.0
-    if widest <= 1.0:
+    if largest_factor <= 1.0:
         return factor
     for term in range(ints[piece + PIECE_TERMS]):
         rate = waves[ints[piece + TERM_INTS + 2 * term + 1]]
@@ -91,7 +91,7 @@ def widened(ints: Ints, numbers: Numbers, waves: Waves, response: int, widest: f
             pole = waves[ints[free + RATES] + j]
             nearest = min(nearest, math.hypot(pole.real - rate.real, abs(pole.imag) - abs(rate.imag)))
     nearest *= numbers[HORIZON] / (NEAREST_FAR + PER_DEGREE * (degree + 1))
-    most = widest ** (1.0 / max(degree, 1))
-    while nearest * factor < 1.0 and factor < most:
+    limit = largest_factor ** (1.0 / max(degree, 1))
+    while nearest * factor < 1.0 and factor < limit:
         factor *= 2.0
     return factor if nearest * factor >= 1.0 else 1.0

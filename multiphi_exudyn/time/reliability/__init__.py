@@ -1,4 +1,4 @@
-"""Reliability: what truncation could not hold, and what to distrust in an answer.
+"""Reliability: the effect of truncation on a run, and what to distrust in its result.
 
 Order: defects, truncation, friction_warnings, impact_warnings, truncation_warnings, run_warnings.
 """

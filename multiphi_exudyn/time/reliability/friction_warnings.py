@@ -1,16 +1,16 @@
-"""What to distrust in the friction of a run: what several bear together, and what truncation turns round.
+"""Friction warnings: redundant friction, friction decided in turn, and slip that truncation turns backwards.
 
-Friction without a spring that follows from what sticks beside it moves as that does: it pushes with its kinetic limit,
-as if it slipped (decision.py). Where one of them has a higher static limit, that one bears it. Where several have, or
-where it has let go and others stick for it, which of them bears the load is not determined, nor when they begin to
-slip: two of equal limits F and static limits S do at S + F here, and might at 2 S. Nor is it at contacts that give way,
-whose limits change with their pressures. Friction at rigid contacts is decided one contact after the other: where
-several turn at one instant, their order may count.
+Friction without a spring whose row depends linearly on those of sticking friction beside it moves with that friction:
+its force is its kinetic limit, as in slip (decision.py). Where one of them has a higher static limit, that one bears
+the load. Where several have, or where one has begun to slip and others stick for it, neither the distribution of the
+load nor the begin of slip is determined: two of equal limits F and static limits S slip at S + F here, and might at
+2 S. Nor is it at compliant contacts, whose limits change with their normal forces. Friction at rigid contacts is
+decided one contact after the other: where several change direction at one instant, their order may matter.
 
-A truncated basis may leave friction that slips a speed s (h_t.x' - v_t - T'/k_t) < 0 against its slip (decision.py):
-the modes of slip and those of stick do not move its place alike. It is told, and not mended. The static residual of the
-modes left out, which serves friction of constant limits, would go with the pressure here: a force that moves no mass
-and follows N' is not symmetric, and may make energy. More modes are the remedy.
+With a truncated basis friction in slip may have a speed s (h_t.x' - v_t - T'/k_t) < 0 against its slip (decision.py):
+the modes of slip and those of stick do not move its place alike. There is a warning and no correction. The static
+residual of the modes left out, which corrects friction of constant limits, would follow the normal force here: a force
+that moves no mass and follows N' is not symmetric, and may create energy. More modes are the remedy.
 """
 
 from __future__ import annotations
@@ -33,28 +33,28 @@ from multiphi_exudyn.mathematics.round_off import CLEAR
 from multiphi_exudyn.mechanics.element import friction_spring
 from multiphi_exudyn.time.segments.segment import Segments
 
-__all__ = ["rubbing_warnings"]
+__all__ = ["friction_warnings"]
 
-SEEN = 1e-9  # of the largest speed: less against a slip is round-off
-BACKWARDS = 0.01  # of the time that it slips: less of it against its slip is not told
+SPEED_ROUND_OFF = 1e-9  # of the largest speed: a smaller one against the slip is round-off
+BACKWARDS = 0.01  # of the time in slip: a smaller share against the slip gives no warning
 REMEDY = "give one element with the sum of their limits, or each a spring (stiffness, tangential_stiffness)"
 
 
-def rubbing_warnings(segments: Segments, model: MultiPhiModel) -> Iterator[str]:
-    """Of a model with friction, one sentence of each kind at most."""
-    yield from _shared(segments)
-    yield from _in_turn(segments)
+def friction_warnings(segments: Segments, model: MultiPhiModel) -> Iterator[str]:
+    """Warnings of a model with friction, at most one sentence of each kind."""
+    yield from _redundant(segments)
+    yield from _decided_in_turn(segments)
     if not model.whole:
-        yield from _backwards(segments)
+        yield from _backward_slip(segments)
 
 
-def _shared(segments: Segments) -> Iterator[str]:
-    """Of those that push with the smallest share of their static limit."""
-    rubs = _rigid_friction(segments)
-    pairs = [(one, other) for one in rubs for other in rubs if one is not other and one.drop > 0]
-    found = [together for level in segments.levels for pair in pairs for together in _together(level, *pair)]
-    if found:
-        share, name, others = min(found)
+def _redundant(segments: Segments) -> Iterator[str]:
+    """Warning of the redundant friction with the smallest ratio of kinetic to static limit."""
+    frictions = _rigid_friction(segments)
+    pairs = [(one, other) for one in frictions for other in frictions if one is not other and one.drop > 0]
+    redundant = [warning for level in segments.levels for pair in pairs for warning in _redundancies(level, *pair)]
+    if redundant:
+        share, name, others = min(redundant)
         yield (
             f"redundant friction: {name!r} follows from {', '.join(map(repr, others))}, so which of them bears the "
             f"load, and when they begin to slip, is not unique: its kinetic limit is {per_cent(share)} of its "
@@ -62,8 +62,8 @@ def _shared(segments: Segments) -> Iterator[str]:
         )
 
 
-class _Rub(NamedTuple):
-    """Friction without a spring: its place, name and link, the state in which it sticks, and what it drops there."""
+class _RigidFriction(NamedTuple):
+    """Friction without a spring: element, name, link, state of stick, and relative drop from the static limit."""
 
     element: int
     name: str
@@ -71,63 +71,73 @@ class _Rub(NamedTuple):
     sticks: int
     drop: float
     pressed: bool  # by a rigid contact
-    gives_way: bool  # what presses it
+    compliant: bool  # whether its contact is
 
-    def turns(self, left: Sequence[int], entered: Sequence[int]) -> bool:
-        """Whether it slips in a level that is left, and the other way, or not at all, in the one that is entered."""
-        return left[self.element] > self.sticks <= entered[self.element] != left[self.element]
+    def turns(self, before: Sequence[int], after: Sequence[int]) -> bool:
+        """Whether it slips before a transition, and slips the other way or sticks after it."""
+        return before[self.element] > self.sticks <= after[self.element] != before[self.element]
 
-    def lets_go(self, left: Sequence[int], entered: Sequence[int]) -> bool:
-        """Whether it falls from its static limit where a level is left."""
-        return self.drop > 0 and left[self.element] == self.sticks < entered[self.element]
+    def breaks_away(self, before: Sequence[int], after: Sequence[int]) -> bool:
+        """Whether it breaks away from its static limit at a transition."""
+        return self.drop > 0 and before[self.element] == self.sticks < after[self.element]
 
 
-def _rigid_friction(segments: Segments) -> list[_Rub]:
-    base, found = segments.levels[0].level.base, []
+def _rigid_friction(segments: Segments) -> list[_RigidFriction]:
+    base, frictions = segments.levels[0].level.base, []
     for i, element in enumerate(base.contacts):
         sticks, number, spring, drop = friction_spring(element)
         if sticks >= 0 and not spring:
-            pressed, gives_way = element.rigid and not element.held, not (element.rigid or element.held)
-            found.append(_Rub(i, element.name, base.link_indices[i][number], sticks, drop, pressed, gives_way))
-    return found
+            pressed, compliant = element.rigid and not element.held, not (element.rigid or element.held)
+            frictions.append(
+                _RigidFriction(i, element.name, base.link_indices[i][number], sticks, drop, pressed, compliant)
+            )
+    return frictions
 
 
-def _together(level: LoadedLevel, one: _Rub, other: _Rub) -> Iterator[tuple[float, str, tuple[str, ...]]]:
-    """Of friction that follows from another one and from what is held in a level: its share, its name, and theirs.
+def _redundancies(
+    level: LoadedLevel, one: _RigidFriction, other: _RigidFriction
+) -> Iterator[tuple[float, str, tuple[str, ...]]]:
+    """Ratio of limits and name of friction that depends on another and on rigid links in a level, and their names.
 
-    It slips while the other one sticks, or has a static limit too; at a contact that gives way it may stick as well.
+    It slips while the other one sticks or has a static limit too; at a compliant contact it may stick as well.
     """
     base, own_state, its_state = level.level.base, level.states[one.element], level.states[other.element]
-    takes_over = other.drop > 0 or its_state == other.sticks
-    shared = own_state >= one.sticks if one.gives_way else own_state > one.sticks and takes_over
-    if its_state < other.sticks or not shared:
+    other_bears = other.drop > 0 or its_state == other.sticks
+    is_shared = own_state >= one.sticks if one.compliant else own_state > one.sticks and other_bears
+    if its_state < other.sticks or not is_shared:
         return
-    held = [k for k in level.level.indices if base.links[k].rigid and k not in (one.link, other.link)] + [other.link]
-    rows, row = base.directions[:, held], base.directions[:, one.link]
+    rigid_links = [k for k in level.level.indices if base.links[k].rigid and k not in (one.link, other.link)]
+    rigid_links.append(other.link)
+    rows, row = base.directions[:, rigid_links], base.directions[:, one.link]
     shares = np.linalg.lstsq(rows, row, rcond=None)[0]
-    own, carried = base.links[one.link].velocity, shares * [base.links[k].velocity for k in held]
-    slides = abs(own - np.sum(carried)) > CLEAR * (abs(own) + np.sum(np.abs(carried)))
-    alone = np.linalg.norm(row - rows @ shares) > INDEPENDENT * np.linalg.norm(row)
-    if slides or alone or abs(shares[-1]) <= INDEPENDENT:
+    velocity, dependent = base.links[one.link].velocity, shares * [base.links[k].velocity for k in rigid_links]
+    slides = abs(velocity - np.sum(dependent)) > CLEAR * (abs(velocity) + np.sum(np.abs(dependent)))
+    independent = np.linalg.norm(row - rows @ shares) > INDEPENDENT * np.linalg.norm(row)
+    if slides or independent or abs(shares[-1]) <= INDEPENDENT:
         return
     owners = {k: i for i, places in enumerate(base.link_indices) for k in places}
-    taken = [owners[k] for k, share in zip(held, shares, strict=True) if abs(share) > INDEPENDENT]
-    yield math.sqrt(1.0 - one.drop), one.name, tuple(dict.fromkeys(base.contacts[k].name for k in taken))
+    involved = [owners[k] for k, share in zip(rigid_links, shares, strict=True) if abs(share) > INDEPENDENT]
+    yield math.sqrt(1.0 - one.drop), one.name, tuple(dict.fromkeys(base.contacts[k].name for k in involved))
 
 
-def _in_turn(segments: Segments) -> Iterator[str]:
-    """Of friction at rigid contacts that turns as other friction turns or lets go, where not all of it sticks."""
-    rubs = _rigid_friction(segments)
-    if len(rubs) < 2 or not any(rub.pressed for rub in rubs):
+def _decided_in_turn(segments: Segments) -> Iterator[str]:
+    """Warning of friction at rigid contacts that changes direction at one instant with other friction."""
+    frictions = _rigid_friction(segments)
+    if len(frictions) < 2 or not any(friction.pressed for friction in frictions):
         return
     for before, after in np.unique(np.column_stack([segments.numbers[:-1], segments.numbers[1:]]), axis=0):
         left, entered = (segments.levels[k].states for k in (before, after))
-        turned = [rub for rub in rubs if rub.turns(left, entered)]
-        turned += [rub for rub in rubs if turned and rub.lets_go(left, entered)]
-        several = any(_coupled(segments.levels[0].level.base, *pair) for pair in itertools.combinations(turned, 2))
-        loose = any(entered[rub.element] > rub.sticks for rub in turned)
-        if several and loose and any(rub.pressed for rub in turned) and any(rub.drop > 0 for rub in turned):
-            names = ", ".join(repr(rub.name) for rub in turned)
+        changed = [friction for friction in frictions if friction.turns(left, entered)]
+        changed += [friction for friction in frictions if changed and friction.breaks_away(left, entered)]
+        coupled = any(_coupled(segments.levels[0].level.base, *pair) for pair in itertools.combinations(changed, 2))
+        some_slip = any(entered[friction.element] > friction.sticks for friction in changed)
+        if (
+            coupled
+            and some_slip
+            and any(friction.pressed for friction in changed)
+            and any(friction.drop > 0 for friction in changed)
+        ):
+            names = ", ".join(repr(friction.name) for friction in changed)
             yield (
                 f"friction in turn: {names} come to rest, or let go, at one instant and are decided one after the "
                 "other, as a rigid contact rubs: with static limits above the kinetic ones another order may have "
@@ -136,30 +146,30 @@ def _in_turn(segments: Segments) -> Iterator[str]:
             return
 
 
-def _coupled(base: ModalBase, one: _Rub, other: _Rub) -> bool:
-    """Whether a force of one accelerates the other."""
-    first, second = (base.directions[:, [rub.element, rub.link]] for rub in (one, other))
+def _coupled(base: ModalBase, one: _RigidFriction, other: _RigidFriction) -> bool:
+    """Whether a force of one friction accelerates the other."""
+    first, second = (base.directions[:, [friction.element, friction.link]] for friction in (one, other))
     sizes = np.outer(np.linalg.norm(first, axis=0), np.linalg.norm(second, axis=0))
     return bool(np.any(np.abs(first.T @ second) > INDEPENDENT * sizes))
 
 
-def _backwards(segments: Segments) -> Iterator[str]:
-    """Of the friction that for the largest part of its slip has a speed against it, seen in the middle of segments.
+def _backward_slip(segments: Segments) -> Iterator[str]:
+    """Warning of the friction with the largest share of slip time at a speed against it, sampled in mid-segment.
 
-    Where every exit is armed it has none: those segments are left out.
+    Segments with all exits armed have no such speed and are left out.
     """
     contacts = segments.levels[0].level.base.contacts
-    middles, lasting = (segments.starts + segments.ends) / 2, segments.ends - segments.starts
+    middles, durations = (segments.starts + segments.ends) / 2, segments.ends - segments.starts
     worst, name = 0.0, ""
     for i, element in enumerate(contacts):
         sticks = friction_spring(element)[0]
         slips = np.array([level.states[i] > sticks for level in segments.levels])[segments.numbers]
-        if sticks < 0 or np.sum(lasting[slips & ~segments.settled]) <= BACKWARDS * np.sum(lasting[slips]):
+        if sticks < 0 or np.sum(durations[slips & ~segments.settled]) <= BACKWARDS * np.sum(durations[slips]):
             continue
         places = np.flatnonzero(slips & ~segments.settled)
         speeds = segments.values(middles[places], "right", functools.partial(_slip_row, i, sticks))
-        against = places[speeds < -SEEN * np.max(np.abs(speeds))]
-        share = float(np.sum(lasting[against]) / np.sum(lasting[slips]))
+        against = places[speeds < -SPEED_ROUND_OFF * np.max(np.abs(speeds))]
+        share = float(np.sum(durations[against]) / np.sum(durations[slips]))
         worst, name = max((worst, name), (share, element.name))
     if worst > BACKWARDS:
         yield (

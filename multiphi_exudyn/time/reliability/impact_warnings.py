@@ -1,8 +1,8 @@
-"""Impacts of a run to which Coulomb's law has several answers (coulomb_impacts.py), of which the run takes one.
+"""Impact warnings: impacts for which Coulomb's law has several solutions (coulomb_impacts.py); the run takes one.
 
-All rigid contacts that touch at the instant count, those too that bear nothing in the answer that is taken. Their
-impulses go into the level in which they are open; what rubs elsewhere without a spring bears none. With restitution
-that is asked of the plastic impact that comes first (rebounds.py).
+All rigid contacts that touch at the instant are considered, also those without an impulse in the chosen solution. Their
+impulses act in the level in which they are open; friction elsewhere without a spring has no impulse. With restitution
+the plastic impact that comes first is examined (rebounds.py).
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ REMEDY = "smaller coefficients of friction, or a finite stiffness, leave one"
 
 
 def impact_warnings(trajectory: Trajectory) -> Iterator[str]:
-    """Of the first such impact, one sentence."""
-    model, known = trajectory.model, dict[tuple[tuple[int, ...], ...], CoulombImpact]()
+    """One sentence on the first such impact."""
+    model, problems = trajectory.model, dict[tuple[tuple[int, ...], ...], CoulombImpact]()
     mu = _coefficients(model)
     for impact in _impacts(trajectory) if np.any(mu) else ():
         if not np.any(mu[list(impact.touching)]):
             continue
         key = impact.level.states, impact.touching
-        if key not in known:
-            known[key] = _coulomb(model, impact, mu)
-        if known[key].is_unique:
+        if key not in problems:
+            problems[key] = _coulomb(model, impact, mu)
+        if problems[key].is_unique:
             continue
-        given = ", ".join(f"{model.contacts[i].name!r} ({mu[i]:g})" for i in impact.touching)
-        touch = f"{given}, with their coefficients of friction, touch in the impact at t = {impact.time:g} s"
-        if not known[key].tried:
+        contacts = ", ".join(f"{model.contacts[i].name!r} ({mu[i]:g})" for i in impact.touching)
+        touch = f"{contacts}, with their coefficients of friction, touch in the impact at t = {impact.time:g} s"
+        if not problems[key].tried:
             yield f"several impacts: {touch}, too many to tell whether Coulomb's law has one answer to it; {REMEDY}"
             return
-        count = known[key].answers(impact.speeds)
+        count = problems[key].answers(impact.speeds)
         if count > 1:
             yield (
                 f"several impacts: {touch}, to which Coulomb's law has {count} answers with other speeds after it; the "
@@ -52,7 +52,7 @@ def impact_warnings(trajectory: Trajectory) -> Iterator[str]:
 
 
 class _Impact(NamedTuple):
-    """When [s], from which level, which contacts touch, and their speeds (k, 2) away from their stops and along."""
+    """Time [s], level before, touching contacts, and their normal and tangential speeds (k, 2) [m/s]."""
 
     time: float
     level: LoadedLevel
@@ -61,7 +61,7 @@ class _Impact(NamedTuple):
 
 
 def _impacts(trajectory: Trajectory) -> Iterator[_Impact]:
-    """All instants at which rigid contacts are struck."""
+    """All impacts of rigid contacts."""
     model, segments = trajectory.model, trajectory.segments
     table = event_table(trajectory.events, model.index)
     rigid = np.array([contact.rigid and not contact.held for contact in model.contacts])
@@ -73,41 +73,46 @@ def _impacts(trajectory: Trajectory) -> Iterator[_Impact]:
     x, v = segments.states(places, times - segments.starts[places])
     numbers, largest = segments.numbers[places], np.zeros(len(rigid))
     gaps, speeds = np.zeros((len(times), len(rigid))), np.zeros((len(times), len(model.links)))
-    for number in np.unique(numbers):  # the states have room for those levels alone
+    for number in np.unique(numbers):  # states are as wide as these levels alone
         level = segments.levels[number]
-        own, n, constants = numbers == number, level.width, level.gap_constants[: len(rigid)]
+        in_level, n, constants = numbers == number, level.width, level.gap_constants[: len(rigid)]
         rows = level.level.gap_rows[: len(rigid)]
-        gaps[own], speeds[own] = x[own, :n] @ rows.T + constants, v[own, :n] @ level.level.speed_rows.T
-        terms = np.abs(x[own, :n]) @ np.abs(rows).T + np.abs(constants)
+        gaps[in_level], speeds[in_level] = (
+            x[in_level, :n] @ rows.T + constants,
+            v[in_level, :n] @ level.level.speed_rows.T,
+        )
+        terms = np.abs(x[in_level, :n]) @ np.abs(rows).T + np.abs(constants)
         largest = np.maximum(largest, np.max(terms, axis=0, initial=0.0))
-    struck = times == trajectory.t_start
-    if np.any(struck):
-        speeds[struck] = _first_speeds(trajectory, segments.levels[numbers[0]], v[0])
+    at_start = times == trajectory.t_start
+    if np.any(at_start):
+        speeds[at_start] = _first_speeds(trajectory, segments.levels[numbers[0]], v[0])
     touches = rigid & (np.abs(gaps) <= TOUCHING * largest)
     touches[instants, table[:, 1].astype(int)] = True
     for k, time in enumerate(times.tolist()):
         touching = tuple(np.flatnonzero(touches[k]).tolist())
         links = [model.base.link_indices[i][:2] for i in touching]
-        found = np.array([[speeds[k, own[0]], speeds[k, own[-1]] if len(own) > 1 else 0.0] for own in links])
-        yield _Impact(time, segments.levels[numbers[k]], touching, found)
+        contact_speeds = np.array(
+            [[speeds[k, pair[0]], speeds[k, pair[-1]] if len(pair) > 1 else 0.0] for pair in links]
+        )
+        yield _Impact(time, segments.levels[numbers[k]], touching, contact_speeds)
 
 
 def _first_speeds(trajectory: Trajectory, level: LoadedLevel, velocity: np.ndarray) -> np.ndarray:
-    """h.x' - v (l,) of all links before an impact at the start itself; velocity: xi' behind it."""
-    moved = level.excitation.stops @ velocity[level.modal.modes : level.width]
-    return np.asarray(trajectory.model.base.directions.T @ trajectory.start.velocity - moved)
+    """h.x' - v (l,) [m/s] of all links before an impact at the start itself; velocity: xi' after it."""
+    stop_speeds = level.excitation.stops @ velocity[level.modal.modes : level.width]
+    return np.asarray(trajectory.model.base.directions.T @ trajectory.start.velocity - stop_speeds)
 
 
 def _coefficients(model: MultiPhiModel) -> np.ndarray:
-    """mu (c,) of the rigid contacts that rub, zero of all others."""
-    given = [contact if isinstance(contact, UnilateralContact) else None for contact in model.contacts]
-    return np.array([0.0 if contact is None or not contact.rigid else contact.friction for contact in given])
+    """mu (c,) of the rigid contacts with friction, zero of all others."""
+    contacts = [contact if isinstance(contact, UnilateralContact) else None for contact in model.contacts]
+    return np.array([0.0 if contact is None or not contact.rigid else contact.friction for contact in contacts])
 
 
 def _coulomb(model: MultiPhiModel, impact: _Impact, mu: np.ndarray) -> CoulombImpact:
-    """The problem of those that touch in the level in which nothing rigid holds."""
+    """Impact problem of the touching contacts in the level without closed rigid links."""
     base = model.base
     rows = model.level_at(tuple(k for k in impact.level.level.indices if not base.links[k].rigid)).gap_rows
     links = [base.link_indices[i][:2] for i in impact.touching]
-    found = [[rows[own[0]], rows[own[-1]] if len(own) > 1 else np.zeros_like(rows[own[0]])] for own in links]
-    return CoulombImpact(np.array(found), mu[list(impact.touching)])
+    pairs = [[rows[pair[0]], rows[pair[-1]] if len(pair) > 1 else np.zeros_like(rows[pair[0]])] for pair in links]
+    return CoulombImpact(np.array(pairs), mu[list(impact.touching)])

@@ -1,12 +1,12 @@
-"""Truncation: how far an answer with r modes can be from the answer with all of them, read off the answer itself.
+"""Truncation: estimate, from a run itself, of the error that r instead of all modes make.
 
 The indicator adds the defects of a run (defects.py) like independent errors and relates them to the motion:
 
     indicator(T) = sqrt( sum over instants until T of |defect|^2 / mean of |y|^2 over [0, T] )
 
 The mean is that of a polygon through 25 instants evenly spaced: the indicator is known to some per cent of itself. It
-predicts an error, it does not bound it: it knows nothing of how fast neighbouring motions separate, and what one level
-holds and the next one drops weighs little in it (keep the levels' highest frequencies near each other).
+predicts an error, it does not bound it: it does not include how fast neighbouring motions separate, and motion that one
+level contains and the next one drops has little weight in it (keep the levels' highest frequencies near each other).
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.time.reliability.defects import DefectHistory
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
-__all__ = ["adapted", "truncation_indicator"]
+__all__ = ["run_with_enough_modes", "truncation_indicator"]
 
-FEWEST = 3  # modes the open level starts with
-GROWTH = 0.25  # of its modes it is given more, at least one
+FEWEST = 3  # modes of the open level in the first run
+GROWTH = 0.25  # of its modes are added each time, at least one
 ABOVE = 1 + 1e-9  # of its last mode's frequency: the cut-off that keeps this mode
 
 
@@ -35,9 +35,9 @@ def truncation_indicator(trajectory: Trajectory, until: float | None = None) -> 
 
         indicator(T) = sqrt( sum over instants until T of |defect|^2 / mean of |y|^2 over [0, T] )
 
-    The defects of a run are what the modes of the next level could not hold at its events; the mean is that of a
-    polygon through 25 instants evenly spaced. The indicator predicts an error, it does not bound it: it knows nothing
-    of how fast neighbouring motions separate.
+    The defects of a run are the motion at its events that the modes of the next level do not contain; the mean is that
+    of a polygon through 25 instants evenly spaced. The indicator predicts an error, it does not bound it: it does not
+    include how fast neighbouring motions separate.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def truncation_indicator(trajectory: Trajectory, until: float | None = None) -> 
     Raises
     ------
     MultiPhiTypeError
-        For what is no Trajectory.
+        For anything but a Trajectory.
 
     Examples
     --------
@@ -74,46 +74,46 @@ def truncation_indicator(trajectory: Trajectory, until: float | None = None) -> 
     return DefectHistory.of(trajectory).indicator(trajectory.t_end if until is None else until)
 
 
-def adapted(model: MultiPhiModel, run: Callable[[MultiPhiModel], Trajectory]) -> Trajectory:
-    """``run`` of the model at the cut-off frequency that its Tolerance needs, which is that of ``Trajectory.model``.
+def run_with_enough_modes(model: MultiPhiModel, run: Callable[[MultiPhiModel], Trajectory]) -> Trajectory:
+    """Repeat ``run`` with more modes until the Tolerance of the model is met; ``Trajectory.model`` has these modes.
 
-    The open level begins with the modes that hold the static flexibility of every contact, and is given more until
-    the indicator is below the tolerance; every other level has its modes up to the same frequency. All modes of the
-    structure are the last that is tried where there are no more than the tolerance allows. The base, at first that of
-    TRIED modes, is extended to twice as many when they are asked for.
+    The open level begins with the modes that contain the static flexibility of every contact, and is given more until
+    the indicator is below the tolerance; every other level has its modes up to the same frequency. The last try is all
+    modes of the structure, unless the tolerance allows fewer. The base, at first of TRIED modes, is doubled when more
+    are needed.
     """
     tolerance = model.modes
-    assert isinstance(tolerance, Tolerance), "who calls this has looked"
+    assert isinstance(tolerance, Tolerance), "the caller has checked it"
     most = min(tolerance.most, model.structure.n)
     source = replace(model, modes=most if model.base.complete else min(most, TRIED))
     level = source.level(())
     rigid = int(np.sum(level.omega == 0))
-    count = max(_holding(level, tolerance.error), min(rigid + 1, most))
+    count = max(_modes_for_flexibility(level, tolerance.error), min(rigid + 1, most))
     while True:
         if count > level.modes and level.modes < most:
             source = replace(source, modes=min(most, 2 * level.modes))
             level = source.level(())
         count = min(count, level.modes)
-        trajectory = run(replace(source, modes=_first(level, count)))
+        trajectory = run(replace(source, modes=_mode_choice(level, count)))
         enough = trajectory.status != "ok" or truncation_indicator(trajectory) <= tolerance.error
         if enough or count == most:
             return trajectory
         count += max(1, round(GROWTH * count))
 
 
-def _first(level: Level, count: int) -> str | int | UpTo:
-    """The choice of modes that keeps so many in the open level and the same frequencies in the others."""
+def _mode_choice(level: Level, count: int) -> str | int | UpTo:
+    """Choice of modes that keeps ``count`` in the open level and the same frequencies in the others."""
     highest = float(level.frequencies[count - 1])
     if count == level.base.modes.count:
         return "all"
     return UpTo(ABOVE * highest, count) if highest > 0 else count
 
 
-def _holding(level: Level, error: float) -> int:
-    """Smallest number of modes that leaves of every contact's flexibility a static residual below the error."""
+def _modes_for_flexibility(level: Level, error: float) -> int:
+    """Smallest number of modes that leaves a static residual below the error at every contact."""
     elastic = level.omega > 0
     flexibility = np.zeros_like(level.gap_rows)
     flexibility[:, elastic] = (level.gap_rows[:, elastic] / level.omega[elastic]) ** 2
-    held = np.cumsum(flexibility, axis=1)
-    enough = held >= (1 - error) * held[:, -1:]
+    partial_sums = np.cumsum(flexibility, axis=1)
+    enough = partial_sums >= (1 - error) * partial_sums[:, -1:]
     return max(FEWEST, 1 + int(np.max(np.argmax(enough, axis=1), initial=0)))

@@ -1,4 +1,4 @@
-"""Left out: sentences on what truncation took of a run, from its verdict (verdict.py)."""
+"""Truncation warnings: sentences on energy and motion lost to truncation, from the verdict of a run (verdict.py)."""
 
 from __future__ import annotations
 
@@ -11,46 +11,46 @@ from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.time.loop.motion_size import INDICATOR, SAMPLES
-from multiphi_exudyn.time.loop.verdict import judge
+from multiphi_exudyn.time.loop.verdict import set_verdict
 from multiphi_exudyn.time.reliability.defects import total_defect
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from multiphi_exudyn.time.warnings.model_warnings import REMEDY
 
-__all__ = ["energy_warning", "least_indicator", "left_out_warnings", "verdict_of"]
+__all__ = ["energy_warning", "indicator_threshold", "truncation_warnings", "verdict_of"]
 
 TEXTS = 64  # sentences of each kind that are kept, by their number
-RIGID_INDICATOR = 0.05  # where a rigid contact is struck: its impacts raise the indicator more than the error
+RIGID_INDICATOR = 0.05  # threshold where a rigid contact is struck: impacts raise the indicator more than the error
 
 
-def least_indicator(tolerance: Tolerance | None) -> float:
-    """From which on it is told; tolerance: the one that the modes were decided by."""
+def indicator_threshold(tolerance: Tolerance | None) -> float:
+    """Threshold of the indicator for a warning; tolerance: the one that decided the modes."""
     return INDICATOR if tolerance is None else min(INDICATOR, tolerance.error)
 
 
 def verdict_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[float, float]:
-    """The verdict on a run of which the loop did not know enough, or not the limit.
+    """Verdict on a run for which the loop could not compute it, or used another limit.
 
-    tolerance: the one that the modes were decided by.
+    tolerance: the one that decided the modes.
     """
     if trajectory.model.whole:
         return 0.0, 0.0
-    limit = least_indicator(tolerance)
+    limit = indicator_threshold(tolerance)
     numbers, isolated = trajectory.ending.numbers.copy(), int(trajectory.ending.record.arrays.levels.isolated)
     numbers[a.DEFECTS] = total_defect(trajectory)
     numbers[a.GIVEN_SQUARE] = numbers[a.GIVEN_SQUARE] or np.sum(trajectory.start.displacement**2)
-    judge(numbers, isolated, limit, trajectory.t_end)
+    set_verdict(numbers, isolated, limit, trajectory.t_end)
     if np.isnan(numbers[a.VERDICT : a.VERDICT + 2]).any():
         numbers[a.LOOKED : a.LOOKED + a.LOOK_WIDTH] = SAMPLES, *trajectory.segments.sizes(trajectory.t_end)
         numbers[a.LOOK_END] = trajectory.t_end
-        judge(numbers, isolated, limit, trajectory.t_end)
+        set_verdict(numbers, isolated, limit, trajectory.t_end)
     share, error = numbers[a.VERDICT : a.VERDICT + 2].tolist()
     return share, error
 
 
-def left_out_warnings(
+def truncation_warnings(
     model: MultiPhiModel, verdict: tuple[float, float], tolerance: Tolerance | None, struck: bool
 ) -> tuple[str, ...]:
-    """Of the energy that truncation took, and of the motion that it did; struck: whether a rigid contact was."""
+    """Warnings of energy and of motion lost to truncation; struck: whether a rigid contact was struck."""
     share, error = verdict
     if tolerance is not None and error > tolerance.error:
         return energy_warning(share) + _tolerance_warning(model, error, tolerance)
@@ -58,7 +58,7 @@ def left_out_warnings(
 
 
 def _tolerance_warning(model: MultiPhiModel, error: float, tolerance: Tolerance) -> tuple[str, ...]:
-    """Of an indicator above the tolerance that the modes were decided by."""
+    """Warning of an indicator above the tolerance that decided the modes."""
     kept = model.level_at(()).modes
     return (
         f"truncation: the indicator is {error:.2g} with {kept} modes, the tolerance {tolerance.error:g}; "
@@ -68,7 +68,7 @@ def _tolerance_warning(model: MultiPhiModel, error: float, tolerance: Tolerance)
 
 @functools.lru_cache(TEXTS)
 def energy_warning(share: float) -> tuple[str, ...]:
-    """Of the energy lost, of the largest of the run; nothing where that is too small to be told."""
+    """Warning of the energy lost, a share of the largest energy of the run; none where the share is zero."""
     if not share > 0:
         return ()
     return (f"lost energy: truncation took {per_cent(share)} of the largest energy of the run; {REMEDY}",)
@@ -76,7 +76,7 @@ def energy_warning(share: float) -> tuple[str, ...]:
 
 @functools.lru_cache(TEXTS)
 def _motion_warning(error: float, struck: bool) -> tuple[str, ...]:
-    """Of the estimated error, which is four times the true one in the mean where a rigid contact was struck."""
+    """Warning of the estimated error, on average four times the true one where a rigid contact was struck."""
     if not error > (RIGID_INDICATOR if struck else INDICATOR):
         return ()
     typical = ", with rigid contacts a quarter of that is typical" if struck else ""

@@ -1,4 +1,4 @@
-"""Run: from a start in all coordinates to a motion that the loop carries, and how one goes on.
+"""Run: the start in all coordinates, the motion that the loop advances, and the continuation of a run.
 
 Order: start_projection, start, continuation, motion, refinement.
 """

@@ -1,6 +1,6 @@
-"""Motion: a run under way, which the loop on flat arrays (loop.py) carries from event to event.
+"""Motion: a run in progress, which the loop on flat arrays (loop.py) advances from event to event.
 
-It has q >= 0 channels, pieces of which may follow while it goes on. A failure on the way ends it early, with its cause.
+It has q >= 0 channels; further pieces of them may follow during the run. A failure ends the run early, with its cause.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ from multiphi_exudyn.time.loop.failures import failure
 from multiphi_exudyn.time.loop.loop import advance
 from multiphi_exudyn.time.record.record import Record
 from multiphi_exudyn.time.record.recorded_segments import Events, Recorded
-from multiphi_exudyn.time.trajectory.final_state import Ending
-from multiphi_exudyn.time.trajectory.trajectory import Again, Trajectory
+from multiphi_exudyn.time.trajectory.final_state import FinalState
+from multiphi_exudyn.time.trajectory.trajectory import Rerun, Trajectory
 
 __all__ = ["Motion", "carry", "measured", "motion_of"]
 
-RECORD_BYTES = 2**31  # of a run: ten million segments of a small model; a laptop has room for it, and for a copy
+RECORD_BYTES = 2**31  # of a run: ten million segments of a small model; a laptop has memory for it and for a copy
 
 carry, measured = entry(advance), entry(measure)
-quiet = np.errstate(all="ignore")  # as compiled: what is not finite is found, and told
+quiet = np.errstate(all="ignore")  # as in compiled code: numbers that are not finite are checked for
 
 
 class Motion:
-    """A run under way on ``arrays``, which it takes over from whatever run had them; collects segments and events.
+    """A run in progress on ``arrays``, which may have belonged to another run before; collects segments and events.
 
-    compiled: False for the loop as plain Python. loop: what is called in its place. time [s]: how far it is. message:
-    why it goes no further, or "". sums_works: whether the loop sums the works of segments, for a ledger; others are
-    integrated when one is asked for. Nothing has happened before ``begin``, or ``advance``, is called.
+    compiled: False for the loop as plain Python. loop: a function to call in its place. time: present time [s].
+    message: cause of a failure, or "". sums_works: whether the loop sums the works of segments for a ledger; otherwise
+    they are integrated when a ledger is made. The run begins with ``process_start`` or ``advance``.
     """
 
     def __init__(
@@ -60,13 +60,13 @@ class Motion:
         self.time, self.message = start.time, ""
         self.record = Record(self.model.contacts, arrays)
         self._window, self._allowed = limits(self.model)
-        ending = Ending(self._at_first(start.time), self.record)
-        self._ending = ending if start.state is None else ending.at(start.state)
+        ending = FinalState(self._initial_numbers(start.time), self.record)
+        self._final = ending if start.state is None else ending.at(start.state)
         self._starting = self.sums_works = True
         self._unavailable: Exception | None = None
 
-    def _at_first(self, time: float) -> np.ndarray:
-        """The first numbers of the arrays for a run that sets out at a time [s]."""
+    def _initial_numbers(self, time: float) -> np.ndarray:
+        """Numbers of a run at its start at a time [s]."""
         numbers = np.zeros(a.OF_A_RUN)
         numbers[a.TIME] = numbers[a.LAST_DECISION] = time
         numbers[a.ALLOWED] = self._allowed
@@ -74,54 +74,54 @@ class Motion:
             numbers[a.GIVEN_POTENTIAL] = self.levels.excitation.static.dot(self.start.displacement)
         return numbers
 
-    def begin(self) -> Motion:
-        """Itself, after whatever happens at the start."""
-        self._carry(self.time)
+    def process_start(self) -> Motion:
+        """Process the events at the start, and return the motion."""
+        self._run_guarded(self.time)
         return self
 
     @property
     def state(self) -> State:
-        """Where it is; there is none after a failure at the start."""
-        state = self._ending.state
+        """The present state; there is none after a failure at the start."""
+        state = self._final.state
         assert state is not None, self.message
         return state
 
     @property
     def start_loss(self) -> Loss:
-        """Energies [J] that its start took, where no event carries them."""
-        return self._ending.start_loss
+        """Energies [J] lost at the start that no event records."""
+        return self._final.start_loss
 
     @property
     def events(self) -> Events:
-        """What has happened so far."""
-        return Events(self.record, self._ending.numbers[a.LOST_SO_FAR : a.LOST_SO_FAR + a.LOSSES])
+        """Events so far."""
+        return Events(self.record, self._final.numbers[a.LOST_SO_FAR : a.LOST_SO_FAR + a.LOSSES])
 
     def go_on_from(self, state: State, time: float) -> None:
-        """Forget what has been collected, and go on from a state and a time [s]."""
+        """Drop the collected segments and events, and continue from a state and a time [s]."""
         self.time, self.message, self._starting = time, "", False
         self.record = Record(self.model.contacts, self.arrays)
-        numbers, piece = self._ending.numbers.copy(), self._ending.piece
+        numbers, piece = self._final.numbers.copy(), self._final.piece
         numbers[a.LAST_DECISION], numbers[a.DEFECTS] = time, math.nan
         numbers[a.LOOK_END] = numbers[a.LOOK_FIRST]
         numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES] = 0.0
         numbers[a.WORKS : a.WORKS + 3] = numbers[a.LOST_SO_FAR : a.LOST_SO_FAR + a.LOSSES] = 0.0
-        self._ending = Ending(numbers, self.record, piece=piece).at(state)
+        self._final = FinalState(numbers, self.record, piece=piece).at(state)
         if self.arrays.owner and self.arrays.owner() is self:
             self.arrays.owner = None
 
     @property
     def static_state(self) -> State:
-        """The present state as one under static loads alone."""
+        """The present state as a state under static loads alone."""
         return self.levels.without_channels(self.state)
 
     def advance(self, end: float, to_change: bool = False) -> None:
-        """Carries the state to ``end``, or to the failure that stops it; if asked, no further than a first event."""
+        """Advance the state to ``end`` [s] or a failure; with ``to_change`` no further than the first event."""
         if not self.message and self.time < end:
-            self._carry(end, to_change)
+            self._run_guarded(end, to_change)
 
-    def trajectory(self, end: float, again: Again | None = None) -> Trajectory:
-        """What has been collected; again: see Trajectory."""
-        sums = self._ending.numbers[a.WORKS : a.VERDICT + 2].tolist()
+    def trajectory(self, end: float, again: Rerun | None = None) -> Trajectory:
+        """Trajectory of the segments and events so far; again: see Trajectory."""
+        sums = self._final.numbers[a.WORKS : a.VERDICT + 2].tolist()
         damped, varying, rubbed, defects, truncated, share, error = sums
         return Trajectory(
             model=self.model,
@@ -131,20 +131,20 @@ class Motion:
             status="failed" if self.message else "ok",
             message=self.message,
             start=self.start,
-            ending=self._ending,
+            ending=self._final,
             load=self.levels.excitation.static,
             again=again,
         )
 
     # ------------------------------------------------------------------ the loop
 
-    def _carry(self, end: float, to_change: bool = False) -> None:
-        """A failure ends the run, with its instant and its cause."""
+    def _run_guarded(self, end: float, to_change: bool = False) -> None:
+        """Run the loop to ``end`` [s]; a failure ends the run, with its instant and its cause."""
         try:
             self.take_over()
             self.arrays.buffers.ints[a.STOP_AT_EVENT] = to_change
             answer = self._run(end)
-            self._leave()
+            self._read_arrays()
             if answer == a.FAILED:
                 raise self.failure()
         except (MultiPhiError, np.linalg.LinAlgError) as error:
@@ -152,11 +152,11 @@ class Motion:
             self.message = f"at t = {self.time:.9g} s: {singular}{error}"
 
     def _run(self, end: float) -> int:
-        """The loop until it ends, with all that it needs."""
+        """Call the loop until it ends, and supply what it needs."""
         while True:
             answer = int(self._loop(*self.arrays.buffers.all, end))
             if answer == a.FULL:
-                self.record.take()
+                self.record.collect()
                 self._check_record()
             elif answer == a.NEED:
                 self._supply()
@@ -164,42 +164,42 @@ class Motion:
                 return answer
 
     def _check_record(self) -> None:
-        """End the run before its record takes the machine."""
-        taken, segments = self.record.bytes, self.record.count
-        if taken > RECORD_BYTES:
-            self._leave()
+        """End the run before its record fills the memory."""
+        size, segments = self.record.bytes, self.record.count
+        if size > RECORD_BYTES:
+            self._read_arrays()
             raise NumericalFailure(
-                f"record: got {taken / 1e9:.2g} GB of {segments} segments, need at most {RECORD_BYTES / 1e9:.2g} GB: "
+                f"record: got {size / 1e9:.2g} GB of {segments} segments, need at most {RECORD_BYTES / 1e9:.2g} GB: "
                 "make the run shorter and continue it (start=), or give loads fewer samples"
             )
 
     @quiet
     def _supply(self) -> None:
-        """Pack what the loop needs, in arrays that begin anew where they have become too large."""
+        """Pack what the loop needs; arrays that have become too large are built anew."""
         try:
             self.arrays.supply()
         except (MultiPhiError, np.linalg.LinAlgError) as error:
             self._unavailable = error
             self.arrays.ints[a.GIVEN_UP] = 1
         if self.arrays.full:
-            self._leave()
+            self._read_arrays()
             self.arrays.forget()
-            self._enter()
+            self._write_arrays()
         elif self.arrays.outgrown:
-            self.record.take()
+            self.record.collect()
             self.arrays.begin_record()
 
     # ------------------------------------------------------------------ the state in the arrays
 
     def take_over(self) -> None:
-        """Get the arrays from the run that has them, and has left them."""
+        """Write this run into the arrays, unless they already hold it."""
         if self.arrays.owner is None or self.arrays.owner() is not self:
-            self._enter()
+            self._write_arrays()
             self.arrays.owner = weakref.ref(self)
 
-    def _reached(self) -> Ending:
-        """Where the loop stands, copied: another run may take the arrays over."""
-        arrays, before = self.arrays, self._ending
+    def _copied_state(self) -> FinalState:
+        """Copy of the state in the loop's arrays, which another run may take over."""
+        arrays, before = self.arrays, self._final
         ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
         state = before.level, before.displacement, before.velocity, before.phases
         if not ints[a.STARTING]:
@@ -208,7 +208,7 @@ class Motion:
             n = level.level.modes
             phases = (a.ARMED,) * exits if settled else tuple(ints[waits : waits + exits].tolist())
             state = level, numbers[x : x + n].copy(), numbers[v : v + n].copy(), phases
-        return Ending(
+        return FinalState(
             numbers[: a.OF_A_RUN].copy(),
             self.record,
             *state,
@@ -220,9 +220,9 @@ class Motion:
             arrays.buffers.size,
         )
 
-    def _enter(self) -> None:
-        """The present state, or the start, into the arrays."""
-        arrays, ending = self.arrays, self._ending
+    def _write_arrays(self) -> None:
+        """Write the present state, or the start, into the arrays."""
+        arrays, ending = self.arrays, self._final
         level = 0 if ending.level is None else arrays.level(ending.level.states)
         arrays.begin_record()
         arrays.set_chatter(self._window, ending.decisions, ending.ring)
@@ -238,18 +238,18 @@ class Motion:
         ints[a.WORKING] = int(self.sums_works)
         numbers[a.TIME], numbers[ints[a.FOUND] + 1] = self.time, ending.evaluations
 
-    def _leave(self) -> None:
-        """The state that the loop has come to, and what it has recorded."""
-        self.record.take()
-        self._ending = self._reached()
-        self.time = float(self._ending.numbers[a.TIME])
+    def _read_arrays(self) -> None:
+        """Read the loop's state and record from the arrays."""
+        self.record.collect()
+        self._final = self._copied_state()
+        self.time = float(self._final.numbers[a.TIME])
         if not self.arrays.buffers.ints[a.STARTING]:
             self._starting = False
 
-    def land(self, part: dict[str, np.ndarray], told: np.ndarray) -> None:
-        """Be where batch.py has brought it: its record, of which the last segment is its final state.
+    def set_result(self, part: dict[str, np.ndarray], run_numbers: np.ndarray) -> None:
+        """Take the result of batch.py: a record, of which the last segment is the final state.
 
-        told: numbers of a run at its end, evaluations, transitions. It goes no further: its chatter check begins anew.
+        run_numbers: numbers of a run at its end, evaluations, transitions. The chatter check begins anew.
         """
         rows = part["rows"]
         number, piece, start, waits = rows[-1].tolist()
@@ -257,9 +257,9 @@ class Motion:
         n, exits = level.level.modes, len(exits_of(level))
         phases = part["phases"][waits : waits + exits].tolist() if waits >= 0 else [a.ARMED] * exits
         x = part["coordinates"][start : start + 2 * n]
-        self.record.keep(part | {"rows": rows[:-1]})
-        ended = Ending(
-            told[: a.OF_A_RUN],
+        self.record.append(part | {"rows": rows[:-1]})
+        final = FinalState(
+            run_numbers[: a.OF_A_RUN],
             self.record,
             level,
             x[:n],
@@ -269,18 +269,18 @@ class Motion:
             levels_built=self.model.levels_built,
             array_bytes=self.arrays.buffers.size,
         )
-        evaluations, transitions = told[a.OF_A_RUN :].tolist()
-        self._ending = ended._replace(evaluations=evaluations, transitions=int(transitions))
-        self._starting, self.time = False, float(told[a.TIME])
+        evaluations, transitions = run_numbers[a.OF_A_RUN :].tolist()
+        self._final = final._replace(evaluations=evaluations, transitions=int(transitions))
+        self._starting, self.time = False, float(run_numbers[a.TIME])
 
     def failure(self) -> Exception:
-        """What has stopped the loop."""
+        """Return the error that has stopped the loop."""
         if self.arrays.ints[a.CAUSE] == a.UNAVAILABLE and self._unavailable is not None:
             return self._unavailable
         return failure(self.arrays)
 
 
 def motion_of(levels: LoadedLevels, start: Start, compiled: bool | None = None) -> Motion:
-    """The run in these levels."""
+    """Return a motion in these levels, on their own arrays."""
     levels.arrays = levels.arrays or LevelArrays(levels)
     return Motion(levels.arrays, start, compiled)

@@ -1,8 +1,8 @@
-"""Start: displacement and velocity of a run in base coordinates, and the states that its elements begin in.
+"""Start: displacement and velocity of a run in base coordinates, and the first states of its elements.
 
-A contact is in touch where its gap is round-off of what makes it, |h|.|y| and the gaps themselves, or of how far the
-motion may take the structure: |y|, where y' takes the modes, and what the loads make; of a rigid one the largest gap
-too, as it may not lie inside. A compliant one that lies inside by so little has a force.
+A contact touches where its gap is round-off of its terms, |h|.|y| and the gaps themselves, or of the possible size of
+the motion: |y|, the displacement of the modes by y', and that by the loads. For a rigid contact the largest gap counts
+too, as it must not begin inside its stop. A compliant one that is inside by so little has a force.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.element import friction_spring
-from multiphi_exudyn.time.run.start_projection import SettingOut
+from multiphi_exudyn.time.run.start_projection import StartProjection
 
 __all__ = ["first_start"]
 
-TOUCHING = 1e-9  # of the gap and of the displacements that make it: closer than this is in touch
-UNSEEN = 1e-12  # of what the motion may make of a gap: nearer is round-off, where a run goes on from another's end
-NOWHERE = np.zeros(0)  # no held places
+TOUCHING = 1e-9  # of the gap and of the terms of it: a smaller gap touches
+CONTINUED = 1e-12  # of the possible size of the motion: a smaller gap is round-off at the start of a continued run
+NO_PLACES = np.zeros(0)  # held places of a start without friction
 
 
 @dataclass(frozen=True)
 class _Scales:
-    """What the gaps (l,) of starts in some levels are judged by, whatever the start; directions: h (m, l).
+    """Scales by which the gaps (l,) of all starts in some levels are judged; directions: h (m, l).
 
-    stops, speeds: where stops are.
-    touching: of the gaps' own terms and what the loads make of them; sizes: of directions, |h|. times: in which a speed
-    moves a mode at most, (m,) [s]. apart: the start of elements of which none touches, None where some have states of
-    their own even then. setting_out: what sees at once that none does, None where the base is not complete.
+    stops, speeds: gaps at y = 0 [m] and velocities of stops [m/s]. touching: tolerance from the gaps' own terms and the
+    loads. sizes: |h|. times: longest times (m,) [s] for which a velocity moves a mode one way. apart: first states of
+    elements of which none touches, None where some have several such states. projection: the quick check that none
+    touches, None where the base is not complete.
     """
 
     directions: np.ndarray
@@ -47,30 +47,30 @@ class _Scales:
     sizes: np.ndarray
     times: np.ndarray
     apart: tuple[int, ...] | None
-    setting_out: SettingOut | None
+    projection: StartProjection | None
 
     @classmethod
     def of(cls, levels: LoadedLevels, end: float) -> _Scales:
-        """Under the loads until the end [s] of a run."""
+        """Scales under the loads until the end [s] of a run."""
         model, base, excitation = levels.model, levels.model.base, levels.excitation
         omega, sizes = base.modes.omega, np.linalg.norm(base.directions, axis=0)
         times = np.minimum(np.divide(1.0, omega, out=np.full(len(omega), end), where=omega > 0), end)
-        ways = base.magnitudes[1] + excitation.stop_ways
-        gaps = np.divide(ways, sizes, out=np.zeros(len(ways)), where=sizes > 0)
+        gap_terms = base.magnitudes[1] + excitation.stop_ways
+        gaps = np.divide(gap_terms, sizes, out=np.zeros(len(gap_terms)), where=sizes > 0)
         others = np.where(np.isinf(base.stiffnesses), np.max(gaps, initial=0.0), 0.0)
         lengths = float(np.linalg.norm(excitation.largest_load * times**2)) + others
-        moved, speeds = map(excitation.moved, levels.drive.values[:2])
+        stop_positions, speeds = map(excitation.moved, levels.drive.values[:2])
         apart = None if model.general or model.force_laws else (OPEN,) * len(model.contacts)
-        near = TOUCHING * ways + UNSEEN * lengths * sizes
-        stops, out = base.gaps - moved, None
+        near = TOUCHING * gap_terms + CONTINUED * lengths * sizes
+        stops, projection = base.gaps - stop_positions, None
         if base.complete:  # the terms of h.y are no more than |h| |y|
             lengths = np.where(sizes > 0, sizes, 1.0)
-            out = SettingOut(base, times, base.directions / lengths, (near - stops) / lengths, 2 * TOUCHING)
-        return cls(base.directions, stops, speeds, near, sizes, times, apart, out)
+            projection = StartProjection(base, times, base.directions / lengths, (near - stops) / lengths, 2 * TOUCHING)
+        return cls(base.directions, stops, speeds, near, sizes, times, apart, projection)
 
     def near(self, terms: np.ndarray, length: float) -> np.ndarray:
-        """Gaps (l,) [m] below which a contact is in touch: by the terms (l,) of h.y, by where the motion goes."""
-        return TOUCHING * terms + (UNSEEN * length) * self.sizes + self.touching
+        """Gaps (l,) [m] below which a contact touches: by the terms (l,) of h.y and by the size of the motion."""
+        return TOUCHING * terms + (CONTINUED * length) * self.sizes + self.touching
 
 
 def first_start(
@@ -81,7 +81,7 @@ def first_start(
     stretches: Mapping[str, float],
     compiled: bool | None = None,
 ) -> Start:
-    """The start from x, x' (n,), None for zero, of a run to ``end`` [s] as the contacts see it.
+    """Start of a run to ``end`` [s] from x, x' (n,), None for zero, with the first states of the contacts.
 
     stretches: of the springs of friction, by the names of their links. compiled: False for plain Python alone.
     """
@@ -89,12 +89,12 @@ def first_start(
     scales: _Scales = levels.starts.get_or_build(end, lambda: _Scales.of(levels, end))
     x = None if displacement is None else vector("displacement", displacement)
     x_t = None if velocity is None else vector("velocity", velocity)
-    if scales.setting_out is None:
+    if scales.projection is None:
         y, v = [np.zeros(len(scales.times)) if given is None else base.coordinates(given) for given in (x, x_t)]
     else:
-        y, v, far = scales.setting_out.coordinates(x, x_t, compiled)
+        y, v, far = scales.projection.coordinates(x, x_t, compiled)
         if far and scales.apart is not None:
-            return Start(y, v, (), (), scales.stops, scales.apart, NOWHERE)
+            return Start(y, v, (), (), scales.stops, scales.apart, NO_PLACES)
     moving = v * scales.times
     length = math.sqrt(y.dot(y)) + math.sqrt(moving.dot(moving))
     gaps, near = y.dot(base.directions) + scales.stops, scales.near(np.abs(y) @ base.magnitudes[0], length)
@@ -108,7 +108,7 @@ def _in_touch(
     judged: tuple[list[float], list[float]],
     stretches: Mapping[str, float],
 ) -> Start:
-    """The start y, y' in which some contacts may be in touch; judged: gaps, and those (l,) below which they are."""
+    """Start y, y' in which some contacts may touch; judged: gaps (l,), and those below which they touch."""
     (y, v), (gaps, near), base = start, judged, model.base
     terms = np.abs(v) @ base.magnitudes[0] + np.abs(scales.speeds)
     rates = drop_round_off(v @ base.directions - scales.speeds, terms)
@@ -120,32 +120,32 @@ def _in_touch(
                 "(static_equilibrium gives an admissible start)"
             )
         depth = 0.0 if abs(gaps[i]) <= near[i] else gaps[i]
-        named = contact.first_state(depth, *rates[list(model.link_indices[i])].tolist())
-        states[i] = [state.name for state in contact.states].index(named)
+        first_state = contact.first_state(depth, *rates[list(model.link_indices[i])].tolist())
+        states[i] = [state.name for state in contact.states].index(first_state)
         if contact.rigid and not contact.held and gaps[i] <= near[i]:
             states[i] = CLOSE
     states = _independent(model, states)
     touching = tuple(i for i, c in enumerate(model.contacts) if c.rigid and not c.held and states[i] != OPEN)
     held = np.array([gaps[i] - stretches.get(model.links[i].name, 0.0) for i in model.held])
-    left = scales.stops.copy()
-    left[list(model.held)] -= held
-    sprung = tuple(k for k in model.active_links(states.tolist()) if k not in touching)
-    return Start(y, v, sprung, touching, left, tuple(states.tolist()), held)
+    gap_offsets = scales.stops.copy()
+    gap_offsets[list(model.held)] -= held
+    spring_links = tuple(k for k in model.active_links(states.tolist()) if k not in touching)
+    return Start(y, v, spring_links, touching, gap_offsets, tuple(states.tolist()), held)
 
 
 def _independent(model: MultiPhiModel, states: np.ndarray) -> np.ndarray:
-    """States of which, of rigid links that would stick, an independent set does; the others wait till it is decided."""
-    found = np.zeros((0, len(model.base.directions)))
+    """First states in which an independent set of the rigid links sticks; the others slip, or are decided later."""
+    basis = np.zeros((0, len(model.base.directions)))
     for i, element in enumerate(model.contacts):
         sticks, number, spring, _ = friction_spring(element)
         if states[i] == sticks and spring == 0 and (element.held or not element.rigid):
             row = model.base.directions[:, model.link_indices[i][number]]
-            left = row / np.linalg.norm(row)
+            remainder = row / np.linalg.norm(row)
             for _ in range(2):
-                left = left - (found @ left) @ found
-            size = float(np.linalg.norm(left))
+                remainder = remainder - (basis @ remainder) @ basis
+            size = float(np.linalg.norm(remainder))
             if size > INDEPENDENT:
-                found = np.vstack([found, left / size])
+                basis = np.vstack([basis, remainder / size])
             else:
                 states[i] = sticks + (SLIP_FORWARD if element.held else IDLE)
     return states

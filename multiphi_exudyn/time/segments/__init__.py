@@ -1,4 +1,4 @@
-"""Segments: the motion between two events, as sums of exponentials, and what is read from it.
+"""Segments: the motion between two events, as sums of exponentials, and quantities computed from it.
 
 Order: segment_flow, quadrature, segment, level_rows.
 """

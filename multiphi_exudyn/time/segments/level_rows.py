@@ -1,8 +1,8 @@
-"""Rows of a level: what is asked of a motion as linear functions of the level's coordinates.
+"""Level rows: displacements, gaps and forces as linear functions of the coordinates of a level.
 
-    x of a point    phi.(Phi_l xi + x_inf,l)          gap  g = h.x + gap       lambda  of what presses
-    T = -lambda of the held link while it sticks; while it slips -push, or s mu N where it goes with the force of a link
-    place of the patch on the counter-surface: the held place w while it sticks, w + q - stretch else, q of that link
+    x of a point    phi.(Phi_l xi + x_inf,l)          gap  g = h.x + gap       lambda  of the pressing links
+    T = -lambda of the held link in stick; in slip -push, or s mu N where it follows the force of another link
+    position of the patch on the counter-surface: the held place w in stick, w + q - stretch in slip, q of that link
 
 Rows (2 n + 1,) of (xi, xi', 1), n coordinates, for a level and a point's row (m,) or an element's position.
 """
@@ -30,7 +30,7 @@ def gap_row(element: int, level: LoadedLevel) -> np.ndarray:
 
 
 def force_row(element: int, level: LoadedLevel) -> np.ndarray:
-    """T [N]."""
+    """Friction force T [N]."""
     link, push = _held_link(level, element), state_of(level, element).push
     if link in level.level.indices:
         row = -_link_row(level, link)
@@ -41,20 +41,20 @@ def force_row(element: int, level: LoadedLevel) -> np.ndarray:
 
 
 def patch_row(element: int, level: LoadedLevel) -> np.ndarray:
-    """The place [m]."""
-    own, link = level.level, _held_link(level, element)
-    held = [k for k, other in enumerate(own.base.links) if other.held]
-    row = np.zeros(2 * own.modes + 1)
-    row[own.modes - len(held) + held.index(link)] = 1.0
-    if link not in own.indices:
+    """Position [m] of the patch of friction on its counter-surface."""
+    modes, link = level.level, _held_link(level, element)
+    held_links = [k for k, other in enumerate(modes.base.links) if other.held]
+    row = np.zeros(2 * modes.modes + 1)
+    row[modes.modes - len(held_links) + held_links.index(link)] = 1.0
+    if link not in modes.indices:
         stretch, constant = level.stretch(element)
-        row[: own.modes] += own.gap_rows[link] - stretch
+        row[: modes.modes] += modes.gap_rows[link] - stretch
         row[-1] = level.gap_constants[link] - constant
     return row
 
 
 def pressing_row(element: int, level: LoadedLevel) -> np.ndarray:
-    """lambda [N] of a contact, with friction or without; of a force law -F."""
+    """Contact force lambda [N], with friction or without; -F of a force law."""
     base, row = level.level.base, np.zeros(2 * level.level.modes + 1)
     row[-1] = -base.laws[element].constant if element in base.laws else 0.0
     for link, sign in base.pressing(element).items():
@@ -64,13 +64,13 @@ def pressing_row(element: int, level: LoadedLevel) -> np.ndarray:
 
 
 def _held_link(level: LoadedLevel, element: int) -> int:
-    """The link of an element that has a held place."""
+    """Link of an element that has a held place."""
     base = level.level.base
     return next(k for k in base.link_indices[element] if base.links[k].held)
 
 
 def _link_row(level: LoadedLevel, link: int) -> np.ndarray:
-    """lambda [N] of a link that holds."""
-    own = level.level
-    k = own.indices.index(link)
-    return np.concatenate([own.force_rows[k], own.force_rate_rows[k], [level.asymptotic.forces[k]]])
+    """lambda [N] of a link that acts in the level."""
+    modal_level = level.level
+    k = modal_level.indices.index(link)
+    return np.concatenate([modal_level.force_rows[k], modal_level.force_rate_rows[k], [level.asymptotic.forces[k]]])

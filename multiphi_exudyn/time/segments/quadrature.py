@@ -1,6 +1,6 @@
-"""Quadrature of a segment's motion: integrals of sums of exponentials, and the works of damping and of what varies.
+"""Quadrature of a segment's motion: integrals of sums of exponentials, and works of damping, loads and friction.
 
-The work of what varies is that of the loads, of the stops of compliant contacts and of those of rigid ones,
+The work of varying loads is that of the loads, of the stops of compliant contacts and of those of rigid ones,
 
     f.y' + lambda s w' + (Y w').(M y'' + C y' + K y - f)
 
@@ -39,14 +39,16 @@ def panels(rates: np.ndarray, start: float, end: float) -> Iterator[tuple[np.nda
 def works(
     level: LoadedLevel, modal: Callable[[np.ndarray, int], np.ndarray], rates: np.ndarray, start: float, end: float
 ) -> tuple[float, float, float]:
-    """Work [J] of damping, of what varies and of friction; modal: xi or a derivative (n, k) at times (k,)."""
+    """Work [J] of damping, varying loads and friction; modal: xi or a derivative (n, k) at times (k,)."""
     damping = varying = friction = 0.0
     for times, weights in panels(rates, start, end):
         xi, xi_t, xi_tt = (modal(times, derivative) for derivative in range(3))
         damping += float(weights @ _dissipation(level, xi_t))
         varying += float(weights @ _power(level, xi, xi_t, xi_tt))
         friction -= float(weights @ (level.pushes @ level.level.gap_rows @ xi_t))
-        friction += sum(float(weights @ (tension * speed)) for tension, speed, _ in _rubbing(level, xi, xi_t))
+        friction += sum(
+            float(weights @ (tension * speed)) for tension, speed, _ in _following_friction(level, xi, xi_t)
+        )
     follows = level.follows
     for sign, time in ((1, start), (-1, end)):
         stretched = follows[:, :-1] @ modal(np.array([time]), 0)[:, 0] + follows[:, -1]
@@ -54,30 +56,31 @@ def works(
     return damping, varying, friction
 
 
-def _rubbing(
+def _following_friction(
     level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """T (k,) of friction that goes with other forces, the speed (k,) on which it works, and s (q,) of its surface."""
-    own, base = level.level, level.level.base
+    """T (k,) [N] of friction that follows other forces, slip speed (k,) [m/s], and s (q,) of its counter-surface."""
+    inner, base = level.level, level.level.base
     for i in level.rubbing_elements:
         held = next(k for k in base.link_indices[i] if base.links[k].held)
         place, rate, constant = level.rubbing(i)
-        yield place @ xi + rate @ xi_t + constant, own.gap_rows[held] @ xi_t, level.excitation.stops[held]
+        yield place @ xi + rate @ xi_t + constant, inner.gap_rows[held] @ xi_t, level.excitation.stops[held]
 
 
 def _dissipation(level: LoadedLevel, xi_t: np.ndarray) -> np.ndarray:
-    """Power (k,) [W] of damping."""
-    base, index, own = level.level.base, list(level.level.indices), level.modal
-    moved, dampers, eta_t = level.motion(xi_t), _dampers(level, xi_t), level.split(xi_t)[0]
+    """Power (k,) [W] dissipated by damping."""
+    base, index, modal = level.level.base, list(level.level.indices), level.modal
+    velocity, dampers, eta_t = level.motion(xi_t), _dampers(level, xi_t), level.split(xi_t)[0]
     coefficients = base.dampings[index]
     viscous = np.divide(dampers.T**2, coefficients, out=np.zeros_like(dampers.T), where=coefficients > 0)
-    given = own.damping - own.vectors.T @ base.damping_matrix(own.indices) @ own.vectors  # of ratios that are given
-    total = np.sum(moved * (base.damping @ moved), axis=0) + np.sum(eta_t * (given @ eta_t), axis=0)
+    # damping matrix of given ratios
+    from_ratios = modal.damping - modal.vectors.T @ base.damping_matrix(modal.indices) @ modal.vectors
+    total = np.sum(velocity * (base.damping @ velocity), axis=0) + np.sum(eta_t * (from_ratios @ eta_t), axis=0)
     return np.asarray(total + np.sum(viscous, axis=1))
 
 
 def _dampers(level: LoadedLevel, xi_t: np.ndarray) -> np.ndarray:
-    """c g' (k, times) [N] of the closed contacts: what their dampers hold against opening."""
+    """c g' (k, times) [N] of the closed contacts: the forces of their dampers."""
     index = list(level.level.indices)
     return np.asarray(level.level.base.dampings[index][:, None] * (level.level.speed_rows[index] @ xi_t))
 
@@ -94,22 +97,22 @@ def _power(level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray, xi_tt: np.ndarr
     springs = stiffness[:, None] * gaps + _dampers(level, xi_t)
     power -= np.sum(springs * (level.excitation.stops[index] @ w_t), axis=0)
     power += level.pushes @ level.excitation.stops @ w_t
-    for tension, _, moves in _rubbing(level, xi, xi_t):
-        power -= tension * (moves @ w_t)
+    for tension, _, surface in _following_friction(level, xi, xi_t):
+        power -= tension * (surface @ w_t)
     if np.any(carried):
-        y, moved, accelerated = level.configuration(xi), level.motion(xi_t), level.motion(xi_tt)
+        y, velocity, acceleration = level.configuration(xi), level.motion(xi_t), level.motion(xi_tt)
         load = (level.excitation.static + base.preload + base.pushes @ level.pushes)[:, None] + varying
-        residual = accelerated + base.damping @ moved + (base.modes.omega**2 * y.T).T - load
+        residual = acceleration + base.damping @ velocity + (base.modes.omega**2 * y.T).T - load
         residual += base.pushes[:, index] @ (springs - _reactions(level, xi, xi_t))
         power += np.sum((carried @ w_t) * residual, axis=0)
     return np.asarray(power)
 
 
 def _reactions(level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray) -> np.ndarray:
-    """Forces (k, times) [N] of the closed rigid contacts that slide, whose friction acts on what channels carry."""
-    own, index = level.level, list(level.level.indices)
-    forces = own.force_rows @ xi + own.force_rate_rows @ xi_t + level.asymptotic.forces[:, None]
-    slides = [link in own.base.oblique and np.isinf(own.base.stiffnesses[link]) for link in index]
+    """Forces (k, times) [N] of the closed rigid contacts that slide; their friction acts on the carried motion."""
+    inner, index = level.level, list(level.level.indices)
+    forces = inner.force_rows @ xi + inner.force_rate_rows @ xi_t + level.asymptotic.forces[:, None]
+    slides = [link in inner.base.oblique and np.isinf(inner.base.stiffnesses[link]) for link in index]
     return np.where(np.array(slides, bool)[:, None], forces, 0.0)
 
 

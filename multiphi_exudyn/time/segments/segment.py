@@ -24,17 +24,17 @@ from multiphi_exudyn.time.loop.motion_size import SAMPLES
 from multiphi_exudyn.time.segments.quadrature import panels, works
 from multiphi_exudyn.time.segments.segment_flow import Flow
 
-__all__ = ["Listed", "Segment", "Segments", "listed", "owners"]
+__all__ = ["Segment", "SegmentList", "Segments", "as_segments", "owners"]
 
-MOST_SAMPLES = 10_000  # of a gap in one segment: what looking for its smallest value may cost
+MOST_SAMPLES = 10_000  # of a gap in one segment: bounds the cost of its smallest value
 
 
 @dataclass(frozen=True, repr=False)
 class Segment(Shown):
     """Motion in one level from ``start`` to ``end`` [s]; flow: its closed form, c (p,) its coefficients.
 
-    phases: of every contact at the start; armed_at: when after it [s] the last of them was armed. entry_work: work [J]
-    of what jumped where it begins.
+    phases: of every exit at the start; armed_at: delay [s] until the last of them is armed. entry_work: work [J] of
+    jumps at the start.
     """
 
     start: float
@@ -72,15 +72,15 @@ class Segment(Shown):
 
     def force(self, contact: int, t: np.ndarray) -> np.ndarray:
         """Contact force (k,) [N] at times (k,), zero where the contact is open."""
-        own = self.level.level
-        if contact not in own.indices:
+        level = self.level.level
+        if contact not in level.indices:
             return np.zeros(len(t))
-        k = own.indices.index(contact)
-        moving = own.force_rows[k] @ self.modal(t) + own.force_rate_rows[k] @ self.modal(t, 1)
+        k = level.indices.index(contact)
+        moving = level.force_rows[k] @ self.modal(t) + level.force_rate_rows[k] @ self.modal(t, 1)
         return np.asarray(moving + self.level.asymptotic.forces[k])
 
     def integral(self, row: np.ndarray, start: float, end: float) -> float:
-        """Integral over time of a row (2 (r + q) + 1,) of (xi, xi', 1); of a sum of free exponentials closed."""
+        """Integral over time of a row (2 (r + q) + 1,) of (xi, xi', 1); the free response in closed form."""
         rows, free, n = self.rows, self.flow.free, len(row) // 2
         terms = row[:n] @ rows + row[n:-1] @ self.basis.derivative(rows)
         basis = Exponentials(self.basis.rates[:free], self.basis.powers[:free], self.basis.unit)
@@ -100,21 +100,21 @@ class Segment(Shown):
         return damping, self.entry_work + varying, friction
 
     def unarmed_times(self, samples: int) -> np.ndarray:
-        """Times (k,) until the only unarmed contact is armed; to the end where it is not, or where there are several.
+        """Times (k,) from the start until the only unarmed exit is armed, or to the end where several are unarmed.
 
         ``samples`` in the shortest period of the level and at least as many in all.
         """
-        waiting = sum(phase is not Phase.ARMED for phase in self.phases)
-        end = self.start + self.armed_at if waiting == 1 and self.armed_at > 0 else self.end
+        unarmed = sum(phase is not Phase.ARMED for phase in self.phases)
+        end = self.start + self.armed_at if unarmed == 1 and self.armed_at > 0 else self.end
         periods = self.level.level.highest_frequency * (end - self.start)
         return np.linspace(self.start, end, samples + math.ceil(min(samples * periods, MOST_SAMPLES)))
 
 
 class Segments(Sequence[Segment], ABC):
-    """The segments of a run, in order, and in arrays what many of them are asked for together.
+    """The segments of a run in order, with values of many of them as arrays.
 
-    defects: sum of |defect|^2 (defects.py) [m2 kg], truncated: of energies lost to truncation at events without their
-    signs [J]; nan where the loop has not summed them. verdict: what these are of the run (verdict.py), nan where that
+    defects: sum of |defect|^2 (defects.py) [m2 kg], truncated: sum of the absolute energies [J] lost to truncation at
+    events; nan where the loop has not summed them. verdict: effect of truncation on the run (verdict.py), nan where it
     is not known.
     """
 
@@ -125,38 +125,38 @@ class Segments(Sequence[Segment], ABC):
     @property
     @abstractmethod
     def starts(self) -> np.ndarray:
-        """When they begin (n,) [s]."""
+        """Start times (n,) [s]."""
 
     @property
     @abstractmethod
     def ends(self) -> np.ndarray:
-        """When they end (n,) [s]."""
+        """End times (n,) [s]."""
 
     @property
     @abstractmethod
     def numbers(self) -> np.ndarray:
-        """The numbers (n,) of their levels in ``levels``."""
+        """Indices (n,) of their levels in ``levels``."""
 
     @property
     @abstractmethod
     def settled(self) -> np.ndarray:
-        """Whether (n,) every exit is armed where they begin: then no signal is below zero in them."""
+        """Whether (n,) every exit is armed at the start: then no signal is below zero in the segment."""
 
     @property
     @abstractmethod
     def levels(self) -> Sequence[LoadedLevel]:
-        """The levels that were visited, each once."""
+        """The visited levels, each once."""
 
     @property
     def visited(self) -> tuple[tuple[int, ...], ...]:
-        """The same by the states of their elements."""
+        """States of the elements of the visited levels."""
         return tuple([level.states for level in self.levels])
 
     @abstractmethod
     def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
         """xi and xi' (2, k, n) of the segments ``places`` (k,), times ``after`` (k,) [s] their starts.
 
-        n: the most coordinates of a level; those that a level has not are zero.
+        n: largest number of coordinates of a level; coordinates beyond those of a level are zero.
         """
 
     @abstractmethod
@@ -168,9 +168,9 @@ class Segments(Sequence[Segment], ABC):
 
     @abstractmethod
     def sizes(self, end: float) -> tuple[float, float]:
-        """Mean of |y|^2 [m2 kg] and largest energy [J] from the first start to ``end`` [s], of SAMPLES even instants.
+        """Mean of |y|^2 [m2 kg] and largest energy [J] from the first start to ``end`` [s], from SAMPLES even instants.
 
-        The mean is that of a polygon through them; energy: kinetic and strain, without its sign.
+        The mean is that of a polygon through them; energy: kinetic and strain, its absolute value.
         """
 
     @property
@@ -190,33 +190,34 @@ class Segments(Sequence[Segment], ABC):
     def _integral(
         self, level: LoadedLevel, row: np.ndarray, places: np.ndarray, starts: np.ndarray, ends: np.ndarray
     ) -> float:
-        """The same from ``starts`` to ``ends`` in segments ``places`` (k,) of one level."""
-        given = zip(places.tolist(), starts.tolist(), ends.tolist(), strict=True)
-        return sum(self[place].integral(row, start, end) for place, start, end in given)
+        """Integral from ``starts`` to ``ends`` in segments ``places`` (k,) of one level."""
+        parts = zip(places.tolist(), starts.tolist(), ends.tolist(), strict=True)
+        return sum(self[place].integral(row, start, end) for place, start, end in parts)
 
     def owners(self, times: np.ndarray, side: str = "right") -> np.ndarray:
-        """Places (k,) of the segments that hold at times (k,) [s]."""
+        """Indices (k,) of the segments of times (k,) [s]."""
         return owners(self.starts, times, side)
 
 
-class Listed(Segments):
-    """Segments that are objects."""
+class SegmentList(Segments):
+    """Segments from a sequence of objects."""
 
     def __init__(self, segments: Sequence[Segment]) -> None:
         self._segments = segments
-        self._known: dict[tuple[int, ...], tuple[int, LoadedLevel]] = {}  # by states: one may have been built anew
+        # by states: a level may have been built twice
+        self._numbered_levels: dict[tuple[int, ...], tuple[int, LoadedLevel]] = {}
         for segment in segments:
-            self._known.setdefault(segment.level.states, (len(self._known), segment.level))
+            self._numbered_levels.setdefault(segment.level.states, (len(self._numbered_levels), segment.level))
 
     @functools.cached_property
     def levels(self) -> Sequence[LoadedLevel]:
         """See ``Segments``."""
-        return [level for _, level in self._known.values()]
+        return [level for _, level in self._numbered_levels.values()]
 
     @functools.cached_property
     def numbers(self) -> np.ndarray:
         """See ``Segments``."""
-        return np.array([self._known[segment.level.states][0] for segment in self._segments], np.int64)
+        return np.array([self._numbered_levels[segment.level.states][0] for segment in self._segments], np.int64)
 
     @functools.cached_property
     def starts(self) -> np.ndarray:
@@ -241,23 +242,23 @@ class Listed(Segments):
 
     def states(self, places: np.ndarray, after: np.ndarray) -> np.ndarray:
         """See ``Segments``."""
-        found = np.zeros((2, len(places), max(level.width for level in self.levels)))
+        states = np.zeros((2, len(places), max(level.width for level in self.levels)))
         for place in np.unique(places).tolist():
-            own, segment = np.flatnonzero(places == place), self._segments[place]
+            chosen, segment = np.flatnonzero(places == place), self._segments[place]
             for derivative in range(2):
-                xi = segment.modal(segment.start + after[own], derivative)
-                found[derivative, own, : len(xi)] = xi.T
-        return found
+                xi = segment.modal(segment.start + after[chosen], derivative)
+                states[derivative, chosen, : len(xi)] = xi.T
+        return states
 
     def values(self, times: np.ndarray, side: str, row: Callable[[LoadedLevel], np.ndarray]) -> np.ndarray:
         """See ``Segments``."""
-        places, found = self.owners(times, side), np.empty(len(times))
+        places, values = self.owners(times, side), np.empty(len(times))
         x, v = self.states(places, times - self.starts[places])
         for number in np.unique(self.numbers[places]).tolist():
-            level, own = self.levels[number], self.numbers[places] == number
+            level, in_level = self.levels[number], self.numbers[places] == number
             n, function = level.width, row(level)
-            found[own] = x[own, :n] @ function[:n] + v[own, :n] @ function[n:-1] + function[-1]
-        return found
+            values[in_level] = x[in_level, :n] @ function[:n] + v[in_level, :n] @ function[n:-1] + function[-1]
+        return values
 
     def sizes(self, end: float) -> tuple[float, float]:
         """See ``Segments``."""
@@ -280,10 +281,10 @@ class Listed(Segments):
 
 
 def owners(starts: np.ndarray, times: np.ndarray, side: str) -> np.ndarray:
-    """Places (k,) of the segments with these starts (n,) that hold at times (k,) [s]."""
+    """Indices (k,) of the segments, by their starts (n,), of times (k,) [s]."""
     return np.maximum(np.searchsorted(starts, times, side="left" if side == "left" else "right") - 1, 0)
 
 
-def listed(segments: Sequence[Segment]) -> Segments:
-    """Segments as what many of them are asked for together."""
-    return segments if isinstance(segments, Segments) else Listed(segments)
+def as_segments(segments: Sequence[Segment]) -> Segments:
+    """Return segments as ``Segments``, which have values of many of them as arrays."""
+    return segments if isinstance(segments, Segments) else SegmentList(segments)

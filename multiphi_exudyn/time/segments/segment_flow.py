@@ -1,4 +1,4 @@
-"""Flow: the motion of a level while one piece of every channel lasts, in closed form.
+"""Segment flow: the motion of a level during one piece of every channel, in closed form.
 
     xi(t) = Re V (c exp(lambda t)) + Re sum_j exp(mu_j t) sum_k x_jk (t/T)^k
 
@@ -23,7 +23,7 @@ __all__ = ["Flow"]
 
 @dataclass(frozen=True)
 class Flow:
-    """xi(t) = Re shapes (coefficients * basis) from a state on; the first ``free`` (p,) are the free response's."""
+    """xi(t) = Re shapes (coefficients * basis) after a state; the first ``free`` of p terms are the free response."""
 
     basis: Exponentials
     shapes: np.ndarray
@@ -32,7 +32,7 @@ class Flow:
 
     @classmethod
     def of(cls, level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray, drive: Drive, horizon: float) -> Flow:
-        """The motion from xi, xi' under a drive, good for [0, horizon], a power of two."""
+        """Motion from xi, xi' under a drive, accurate in [0, horizon] [s], a power of two."""
         response, steady = level.response, level.asymptotic.drive if level.driven else None
         blocks = [_forced(level, rate, terms, horizon) for rate, terms in drive.terms]
         for (rate, _), block in zip(drive.terms, blocks, strict=True):
@@ -48,20 +48,20 @@ class Flow:
             np.concatenate([response.basis.powers, *map(np.arange, counts)]),
             unit,
         )
-        own = free * (unit / response.basis.unit) ** response.basis.powers
-        still = np.zeros((len(xi) - len(response.shapes), len(free)))
-        shapes = np.hstack([np.vstack([response.shapes, still]), forced])
-        return cls(basis, shapes, np.concatenate([own, np.ones(forced.shape[1])]), len(free))
+        free_coefficients = free * (unit / response.basis.unit) ** response.basis.powers
+        no_channels = np.zeros((len(xi) - len(response.shapes), len(free)))
+        shapes = np.hstack([np.vstack([response.shapes, no_channels]), forced])
+        return cls(basis, shapes, np.concatenate([free_coefficients, np.ones(forced.shape[1])]), len(free))
 
 
 def _forced(level: LoadedLevel, rate: complex, terms: np.ndarray, horizon: float) -> np.ndarray:
     """x_jk (K, r + q) of a term of the drive (D + 1, q)."""
-    own, channels = level.modal, level.channels
-    given = (terms.T * horizon ** np.arange(len(terms))).T
-    forces = given @ channels.force.T
+    modal, channels = level.modal, level.channels
+    scaled_terms = (terms.T * horizon ** np.arange(len(terms))).T
+    forces = scaled_terms @ channels.force.T
     if np.any(channels.force_rate):
-        forces = forces + differentiated(rate, given, horizon) @ channels.force_rate.T
-    x = particular(own.squares, own.damping, level.response, rate, forces, horizon)
-    block = np.zeros((max(len(x), len(given)), own.modes + given.shape[1]), complex)
-    block[: len(x), : own.modes], block[: len(given), own.modes :] = x, given
+        forces = forces + differentiated(rate, scaled_terms, horizon) @ channels.force_rate.T
+    x = particular(modal.squares, modal.damping, level.response, rate, forces, horizon)
+    block = np.zeros((max(len(x), len(scaled_terms)), modal.modes + scaled_terms.shape[1]), complex)
+    block[: len(x), : modal.modes], block[: len(scaled_terms), modal.modes :] = x, scaled_terms
     return block

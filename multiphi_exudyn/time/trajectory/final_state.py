@@ -1,4 +1,4 @@
-"""Ending: where a run stands when its loop stops, copied out of the arrays, which another run may have from then on."""
+"""Final state: the state of a run when its loop stops, copied out of the arrays, which another run may then use."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from multiphi_exudyn.events.transitions.state import Loss, State
 from multiphi_exudyn.time.record.record import PHASES, Record
 from multiphi_exudyn.time.trajectory.ledger import Statistics
 
-__all__ = ["NUMBERS", "Ending"]
+__all__ = ["NUMBERS", "FinalState"]
 
 NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
 NONE = np.zeros(0)
 
 
-class Ending(NamedTuple):
-    """What a run goes on from, and what is told of it when somebody asks.
+class FinalState(NamedTuple):
+    """State, sums and counts of a run, from which it is continued and its ledger and statistics are made.
 
-    numbers: the first ones of the arrays, which are a run's own. record: what it has left. level: of its last state,
-    None before the first one, with displacement xi, velocity xi' (n,) and the numbers of its exits' phases.
-    decisions, ring: of the chatter check. piece: of the channels. evaluations, transitions: so far. levels_built,
-    array_bytes: of the model, and of the arrays.
+    numbers: the run's own numbers, the first ones of the arrays. record: its segments and events. level: of the last
+    state, None before the first one, with displacement xi, velocity xi' (n,) and the numbers of its exits' phases.
+    decisions, ring: of the chatter check. piece: of the channels. evaluations, transitions: counts so far.
+    levels_built, array_bytes: of the model, and of the arrays.
     """
 
     numbers: np.ndarray
@@ -42,8 +42,8 @@ class Ending(NamedTuple):
     levels_built: int = 0
     array_bytes: int = 0
 
-    def at(self, state: State) -> Ending:
-        """The same in another state."""
+    def at(self, state: State) -> FinalState:
+        """Return a copy with another state."""
         return self._replace(
             level=state.level,
             displacement=state.displacement,
@@ -53,42 +53,42 @@ class Ending(NamedTuple):
 
     @property
     def state(self) -> State | None:
-        """The last state."""
+        """The last state, None before the first one."""
         if self.level is None:
             return None
         return State(self.level, self.displacement, self.velocity, tuple([PHASES[k] for k in self.phases]))
 
     @property
     def start_loss(self) -> Loss:
-        """Energies [J] that the start took, where no event carries them."""
+        """Energies [J] lost at the start that no event records."""
         if self.level is None:
             return Loss()
         return Loss(*self.numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES].tolist())
 
     @property
     def sums(self) -> list[float]:
-        """What a ledger is made of, see ``ledger_of``."""
+        """Numbers from which a ledger is made, see ``ledger_of``."""
         sums: list[float] = self.numbers[a.LOST_AT_START : a.WORK + 1].tolist()
         return sums
 
     @property
     def given_energy(self) -> float:
-        """Kinetic and strain energy [J] that a run was given that sets out."""
+        """Kinetic and strain energy [J] at the start of a run that does not continue another one."""
         energy, potential = self.numbers[a.GIVEN_ENERGY : a.GIVEN_POTENTIAL + 1].tolist()
         return float(energy + potential)
 
     @property
     def energy(self) -> float:
-        """Kinetic and strain energy [J] of the last state; the loop has that of runs which end like this one."""
+        """Kinetic and strain energy [J] of the last state, from the loop where it has computed it."""
         assert self.level is not None, "a run with segments has a final state"
-        left = float(self.numbers[a.LEFT_ENERGY])
-        if not math.isnan(left):
-            return left
+        from_loop = float(self.numbers[a.LEFT_ENERGY])
+        if not math.isnan(from_loop):
+            return from_loop
         self.record.arrays.add_strain(self.level.states)
         return self.level.energy(self.displacement, self.velocity)
 
     def statistics(self, segments: int, events: int, possible: int) -> Statistics:
-        """What the run has taken; possible: levels."""
+        """Work of the run; possible: number of possible levels."""
         return Statistics(
             levels_built=self.levels_built,
             levels_possible=possible,

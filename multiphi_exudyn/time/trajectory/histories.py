@@ -1,8 +1,8 @@
-"""Histories: what can be asked of a motion in segments, of a run or of one that was saved (eq. 38.4).
+"""Histories: displacements, forces and energies of a motion in segments, of a run or a saved one (eq. 38.4).
 
     x(t) = Phi_l eta(t) + x_inf,l,   eta(t) = Re V (c exp(lambda (t - t_k)))   on [t_k, t_k+1]
 
-Everything but energies is a row of (xi, xi', 1) in every level; who has the levels says which.
+All but energies are rows of (xi, xi', 1) in every level, which the subclasses define.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.events.transitions.state import Event, total_impulse
 from multiphi_exudyn.mechanics.arguments import no_text
 from multiphi_exudyn.mechanics.structure import At
-from multiphi_exudyn.time.segments.segment import Segment, Segments, listed
+from multiphi_exudyn.time.segments.segment import Segment, Segments, as_segments
 from multiphi_exudyn.time.trajectory.history_figure import history_figure
 
 if TYPE_CHECKING:
@@ -32,10 +32,10 @@ INSTANTS = 1001  # of a history where no times are given
 
 
 class Histories(Shown, ABC):
-    """What can be asked of a motion, of a run or of one that was saved.
+    """Histories of a motion, of a run or of a saved one.
 
     Times [s] are scalars or (k,); at an event ``side`` chooses the limit from the "right" (default) or the "left".
-    MultiPhiValueError and MultiPhiTypeError for a time outside of the motion, and for a name that there is not.
+    MultiPhiValueError and MultiPhiTypeError for a time outside of the motion, and for an unknown name.
     """
 
     segments: Sequence[Segment]
@@ -46,12 +46,12 @@ class Histories(Shown, ABC):
     @property
     @abstractmethod
     def t_start(self) -> float:
-        """When it begins [s]."""
+        """Start of the motion [s]."""
 
     @property
     @abstractmethod
     def points(self) -> tuple[str, ...]:
-        """Names of points that histories are asked for."""
+        """Names of points."""
 
     @property
     @abstractmethod
@@ -61,7 +61,7 @@ class Histories(Shown, ABC):
     @property
     @abstractmethod
     def frictions(self) -> tuple[str, ...]:
-        """Names of what has friction, and is no contact."""
+        """Names of friction elements that are no contacts."""
 
     @property
     @abstractmethod
@@ -69,11 +69,11 @@ class Histories(Shown, ABC):
         """Names of contacts that have friction."""
 
     @abstractmethod
-    def _row(self, question: str, name: At) -> Callable[[Any], np.ndarray]:
+    def _row(self, quantity: str, name: At) -> Callable[[Any], np.ndarray]:
         """A level's row (2 (r + q) + 1,) of (xi, xi', 1) for "at", "gap", "contact_force", "friction_force", "slip"."""
 
     @abstractmethod
-    def _holds(self, question: str, name: str) -> Callable[[Any], bool]:
+    def _holds(self, quantity: str, name: str) -> Callable[[Any], bool]:
         """Whether in a level a contact is closed ("contact_intervals"), or a friction sticks ("stick_intervals")."""
 
     @abstractmethod
@@ -186,7 +186,7 @@ class Histories(Shown, ABC):
         return self._values("friction_force", name, t, side)
 
     def slip(self, name: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
-        """How far [m] along +h the patch of a friction has moved on its counter-surface since the start.
+        """Displacement [m] along +h of the patch of a friction on its counter-surface since the start.
 
         A float, or (k,). Exact: it does not change by a bit while the patch sticks.
         """
@@ -219,7 +219,7 @@ class Histories(Shown, ABC):
         Raises
         ------
         MultiPhiValueError
-            For a name or a time that there is not.
+            For an unknown name, or a time outside of the motion.
 
         Examples
         --------
@@ -272,12 +272,14 @@ class Histories(Shown, ABC):
         return {name: self.at(name, times) for name in (self.points if points is None else points)}
 
     def _intervals(self, holds: Callable[[Any], bool]) -> list[tuple[float, float]]:
-        """When a level lasts that holds [s], instants left out."""
+        """Intervals [s] of the levels for which ``holds`` is true, instants left out."""
         intervals: list[tuple[float, float]] = []
-        own = self._segments
-        chosen = np.array([holds(level) for level in own.levels], bool)
-        places = np.flatnonzero(chosen[own.numbers] & (own.ends > own.starts)) if len(own) else np.zeros(0, np.int64)
-        for start, end in zip(own.starts[places].tolist(), own.ends[places].tolist(), strict=True):
+        segments = self._segments
+        chosen = np.array([holds(level) for level in segments.levels], bool)
+        places = np.zeros(0, np.int64)
+        if len(segments):
+            places = np.flatnonzero(chosen[segments.numbers] & (segments.ends > segments.starts))
+        for start, end in zip(segments.starts[places].tolist(), segments.ends[places].tolist(), strict=True):
             if intervals and intervals[-1][1] == start:
                 intervals[-1] = (intervals[-1][0], end)
             else:
@@ -290,18 +292,18 @@ class Histories(Shown, ABC):
         states = segments.states(places, times - segments.starts[places])
         numbers, result = segments.numbers[places], np.empty((0, len(times)))
         for number in np.unique(numbers).tolist():
-            level, own = segments.levels[number], np.flatnonzero(numbers == number)
-            x = self._motion(level, states[derivative, own, : level.width].T)
+            level, in_level = segments.levels[number], np.flatnonzero(numbers == number)
+            x = self._motion(level, states[derivative, in_level, : level.width].T)
             if not len(result):
                 result = np.empty((len(x), len(times)))
-            result[:, own] = x if derivative else x + self._asymptotic(level)[:, None]
+            result[:, in_level] = x if derivative else x + self._asymptotic(level)[:, None]
         return result if np.ndim(t) else result[:, 0]
 
-    def _values(self, question: str, name: At, t: float | np.ndarray, side: str) -> Any:
+    def _values(self, quantity: str, name: At, t: float | np.ndarray, side: str) -> Any:
         """A row of (xi, xi', 1) at times: a float, or (k,)."""
-        row = self._row(question, name)
-        found = self._segments.values(self._times(t), _side(side), row)
-        return found if np.ndim(t) else float(found[0])
+        row = self._row(quantity, name)
+        values = self._segments.values(self._times(t), _side(side), row)
+        return values if np.ndim(t) else float(values[0])
 
     def _evaluate(
         self, t: float | np.ndarray, side: str, values: Callable[[Segment, np.ndarray], np.ndarray]
@@ -312,10 +314,10 @@ class Histories(Shown, ABC):
         parts = np.split(np.argsort(owner, kind="stable"), np.flatnonzero(np.diff(np.sort(owner))) + 1)
         result: np.ndarray | None = None
         for part in parts:
-            found = values(self.segments[owner[part[0]]], times[part])
+            part_values = values(self.segments[owner[part[0]]], times[part])
             if result is None:
-                result = np.empty((*found.shape[:-1], len(times)))
-            result[..., part] = found
+                result = np.empty((*part_values.shape[:-1], len(times)))
+            result[..., part] = part_values
         assert result is not None
         if np.ndim(t) == 0:
             return float(result[0]) if result.ndim == 1 else result[:, 0]
@@ -333,13 +335,13 @@ class Histories(Shown, ABC):
         if not self.segments:
             raise MultiPhiValueError(f"t: got a time of a run that has no motion ({self.message}), need one that began")
         if not np.all((times >= self.t_start) & (times <= self.t_end)):
-            given = " to ".join(f"{t:g}" for t in sorted({np.min(times), np.max(times)}))
-            raise MultiPhiValueError(f"t: got {given} s, need {self.t_start:g} <= t <= {self.t_end:g} s")
+            interval = " to ".join(f"{t:g}" for t in sorted({np.min(times), np.max(times)}))
+            raise MultiPhiValueError(f"t: got {interval} s, need {self.t_start:g} <= t <= {self.t_end:g} s")
         return times
 
     @functools.cached_property
     def _segments(self) -> Segments:
-        return listed(self.segments)
+        return as_segments(self.segments)
 
     def _owners(self, times: np.ndarray, side: str) -> np.ndarray:
         return self._segments.owners(times, _side(side))

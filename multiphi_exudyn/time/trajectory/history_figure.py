@@ -1,4 +1,4 @@
-"""A picture of histories: displacements, contact forces below them, and in grey when contacts are closed or stick."""
+"""History figure: displacements, contact forces below them, and in grey the times of closed or sticking contacts."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def history_figure(
     figure = Figure(figsize=(SIZE[0], SIZE[1] * len(panels)), layout="constrained")
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (curves, label) in zip(axes, panels, strict=True):
-        _shade(axis, (interval for own in intervals.values() for interval in own))
+        _shade(axis, (interval for of_one in intervals.values() for interval in of_one))
         for name, values in curves.items():
             axis.plot(times, values, lw=LINE, label=name)
         axis.set_ylabel(label)

@@ -1,4 +1,4 @@
-"""What a run has taken and where its energy went."""
+"""Ledger and statistics: the energy balance of a run, and its work in counts and bytes."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ __all__ = ["Ledger", "Statistics", "ledger_of"]
 class Statistics(NamedTuple):
     """Work of a run; function_evaluations counts samples of event signals.
 
-    record_bytes: what its segments and events take; array_bytes: the levels, maps and loads of the loop, which runs of
-    one model under the same loads share.
+    record_bytes: memory of its segments and events; array_bytes: of the levels, maps and loads of the loop, which runs
+    of one model under the same loads share.
     """
 
     levels_built: int
@@ -31,10 +31,10 @@ class Statistics(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Ledger(Shown):
-    """Energy balance of a run, all in J: initial + work_of_loads = final + everything that was lost.
+    """Energy balance of a run, all in J: initial + work_of_loads = final + all losses.
 
-    Made by ``Trajectory.ledger``. Two independent sides: what was lost is added up event by event and in closed form,
-    the final energy is read off the last state; ``residual`` is what is left over, round-off if nothing was forgotten.
+    Made by ``Trajectory.ledger``. Two independent sides: losses are added up event by event and in closed form, the
+    final energy is that of the last state; ``residual`` is the difference, round-off if no loss is missing.
 
     Attributes
     ----------
@@ -45,11 +45,11 @@ class Ledger(Shown):
     impact : float
         Lost [J] in impacts of rigid contacts.
     truncation_kinetic, truncation_strain : float
-        What the modes of the next level could not hold [J].
+        Lost [J] at transitions, in motion that the modes of the next level do not contain.
     damping : float
         Of the structure and of contacts [J].
     friction : float
-        Limits times ways slipped on the counter-surfaces, and what springs drop by where a static limit lets go [J].
+        Limits times slip on the counter-surfaces, and losses of springs where a static limit is exceeded [J].
     final : float
         Kinetic + strain energy [J] at the end.
 
@@ -94,7 +94,7 @@ def ledger_of(
 ) -> Ledger:
     """The ledger of the numbers (13,) of a run from LOST_AT_START to WORK (events/arrays.py).
 
-    works [J]: of damping, of what varies and of friction, of all segments. static: work [J] of constant loads.
+    works [J]: of damping, varying loads and friction, of all segments. static: work [J] of constant loads.
     """
     impact, kinetic, strain, stopped, damping, friction, *lost, work = sums
     damped, varying, rubbed = works

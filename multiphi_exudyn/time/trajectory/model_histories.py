@@ -1,4 +1,4 @@
-"""Histories of a model's motion: its points, contacts and frictions by their names, as rows of its levels."""
+"""Model histories: points, contacts and frictions of a model by their names, as rows of its levels."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ROWS = {  # of a level, for an element's position
 
 
 class ModelHistories(Histories):
-    """What a motion of ``model`` is asked by names."""
+    """Histories of a motion of ``model`` by names."""
 
     model: MultiPhiModel
 
@@ -55,21 +55,21 @@ class ModelHistories(Histories):
         names = [self.model.contacts[i].name for i in self.model.rubbing]
         return tuple(name for name in names if name in self.contacts)
 
-    def _row(self, question: str, name: At) -> Callable[[LoadedLevel], np.ndarray]:
-        if question == "at":
+    def _row(self, quantity: str, name: At) -> Callable[[LoadedLevel], np.ndarray]:
+        if quantity == "at":
             if not isinstance(name, (str, Mapping)):
                 issue(row_warnings(self.model, self.model.structure.row(name)))
             return functools.partial(point_row, self.model.base.modes.shapes.T @ self.model.structure.row(name))
-        row = ROWS[question]
-        place = self._friction if question in ("friction_force", "slip") else self._contact
-        return functools.partial(row, place(question, str(name)))
+        row = ROWS[quantity]
+        place = self._friction if quantity in ("friction_force", "slip") else self._contact
+        return functools.partial(row, place(quantity, str(name)))
 
-    def _holds(self, question: str, name: str) -> Callable[[LoadedLevel], bool]:
-        if question == "stick_intervals":
-            places = self.model.link_indices[self._friction(question, name)]
+    def _holds(self, quantity: str, name: str) -> Callable[[LoadedLevel], bool]:
+        if quantity == "stick_intervals":
+            places = self.model.link_indices[self._friction(quantity, name)]
             links = [k for k in places if self.model.links[k].held]
         else:
-            links = self.model.pressing_links(self._contact(question, name))
+            links = self.model.pressing_links(self._contact(quantity, name))
         return lambda level: not set(links).isdisjoint(level.level.indices)
 
     def _motion(self, level: LoadedLevel, xi: np.ndarray) -> np.ndarray:
@@ -78,18 +78,18 @@ class ModelHistories(Histories):
     def _asymptotic(self, level: LoadedLevel) -> np.ndarray:
         return np.asarray(self.model.base.modes.shapes @ level.asymptotic.configuration)
 
-    def _contact(self, question: str, name: str) -> int:
-        """Position of what is no friction."""
+    def _contact(self, quantity: str, name: str) -> int:
+        """Index of a contact or force law."""
         i = self.model.index(name)
         if isinstance(self.model.contacts[i], Friction):
             raise MultiPhiValueError(
-                f"{question}: got the friction {name!r}, need a contact (friction_force, slip, stick_intervals)"
+                f"{quantity}: got the friction {name!r}, need a contact (friction_force, slip, stick_intervals)"
             )
         return i
 
-    def _friction(self, question: str, name: str) -> int:
-        """Position of a friction."""
+    def _friction(self, quantity: str, name: str) -> int:
+        """Index of an element with friction."""
         i = self.model.index(name)
         if not any(self.model.links[k].held for k in self.model.link_indices[i]):
-            raise MultiPhiValueError(f"{question}: got {name!r}, which has no friction, need the name of one that has")
+            raise MultiPhiValueError(f"{quantity}: got {name!r}, which has no friction, need the name of one that has")
         return i

@@ -1,6 +1,6 @@
-"""Saved trajectories: a motion in a NumPy file, which is evaluated afterwards; it cannot be continued.
+"""Saved trajectory: a motion in a NumPy file, for later evaluation; it cannot be continued.
 
-The file is an .npz archive without pickled objects. Of s segments, e events, and for every level l that was visited:
+The file is an .npz archive without pickled objects. Of s segments, e events, and for every visited level l:
 
     header                         JSON: names, status, warnings, statistics, ledger, states of the levels
     segment_start, _end, _level    (s,) [s], [s], number of the level
@@ -16,7 +16,7 @@ The file is an .npz archive without pickled objects. Of s segments, e events, an
     level{l}_holds                 (questions,), whether a contact is closed, or a friction sticks
     level{l}_moving, _strain_*     kinetic energy 1/2 |moving xi'|^2, and the terms of a StrainForm
 
-It has n numbers for each mode of each level that was visited.
+It has n numbers for each mode of each visited level.
 """
 
 from __future__ import annotations
@@ -61,17 +61,17 @@ FORMAT = 1
 class SavedTrajectory(Histories):
     """A trajectory from a file: all histories, events and energies of a run, but no model, and no way to continue it.
 
-    Made by ``load_trajectory``; its questions are those of a Trajectory. Times [s] are scalars or (k,); at an event
+    Made by ``load_trajectory``; its histories are those of a Trajectory. Times [s] are scalars or (k,); at an event
     ``side`` chooses the limit from the "right" (default) or the "left".
 
     Attributes
     ----------
     segments : sequence of Segment
-        The pieces of the motion.
+        The segments of the motion.
     events : sequence of Event
         In order of time.
     t_end : float
-        How far it goes [s].
+        End of the motion [s].
     status, message : str
         "ok", or "failed" and the cause.
     warnings : tuple of str
@@ -81,7 +81,7 @@ class SavedTrajectory(Histories):
     stats : Statistics
         Work of the run.
     header : mapping
-        What the file says of itself: names of points, contacts and frictions, states of the levels.
+        Contents of the file: names of points, contacts and frictions, states of the levels.
 
     Examples
     --------
@@ -111,7 +111,7 @@ class SavedTrajectory(Histories):
 
     @property
     def t_start(self) -> float:
-        """When it begins [s]."""
+        """Start of the motion [s]."""
         return float(self.header["t_start"])
 
     @property
@@ -140,25 +140,25 @@ class SavedTrajectory(Histories):
         yield "events", str(len(self.events))
         yield "warnings", kinds(self.warnings)
 
-    def _row(self, question: str, name: At) -> Callable[[SavedLevel], np.ndarray]:
-        if question == "at" and isinstance(name, Mapping):
-            parts = [(factor, self._row(question, point)) for point, factor in name.items()]
+    def _row(self, quantity: str, name: At) -> Callable[[SavedLevel], np.ndarray]:
+        if quantity == "at" and isinstance(name, Mapping):
+            parts = [(factor, self._row(quantity, point)) for point, factor in name.items()]
             return lambda level: np.sum([factor * row(level) for factor, row in parts], axis=0)
-        if question == "at" and not isinstance(name, str):
+        if quantity == "at" and not isinstance(name, str):
             return lambda level: np.concatenate([name @ level.shapes, np.zeros(level.width), [name @ level.centre]])
-        key = ("contact_force" if question == "contact_impulse" else question, str(name))
-        self._check(question, key)
+        key = ("contact_force" if quantity == "contact_impulse" else quantity, str(name))
+        self._check(quantity, key)
         return lambda level: level.rows[key]
 
-    def _holds(self, question: str, name: str) -> Callable[[SavedLevel], bool]:
-        key = ("contact_force" if question == "contact_intervals" else "friction_force", name)
-        self._check(question, key)
+    def _holds(self, quantity: str, name: str) -> Callable[[SavedLevel], bool]:
+        key = ("contact_force" if quantity == "contact_intervals" else "friction_force", name)
+        self._check(quantity, key)
         return lambda level: level.holds[key]
 
-    def _check(self, question: str, key: tuple[str, str]) -> None:
-        known = [name for asked, name in self.header["questions"] if asked == key[0]]
-        if key[1] not in known:
-            raise MultiPhiValueError(f"{question}: got {key[1]!r}, need one of: {', '.join(known) or 'none'}")
+    def _check(self, quantity: str, key: tuple[str, str]) -> None:
+        names = [name for saved, name in self.header["questions"] if saved == key[0]]
+        if key[1] not in names:
+            raise MultiPhiValueError(f"{quantity}: got {key[1]!r}, need one of: {', '.join(names) or 'none'}")
 
     def _motion(self, level: SavedLevel, xi: np.ndarray) -> np.ndarray:
         return np.asarray(level.shapes @ xi)
@@ -167,8 +167,8 @@ class SavedTrajectory(Histories):
         return level.centre
 
 
-def save(run: Histories, path: Path, **told: Any) -> None:
-    """Write a run's motion; told: status, message, warnings, ledger, stats of the header."""
+def save(run: Histories, path: Path, **facts: Any) -> None:
+    """Write a run's motion; facts: status, message, warnings, ledger, stats for the header."""
     elements = tuple(dict.fromkeys([*run.contacts, *run.frictions, *elements_of(run.events)]))
     levels, numbers = levels_of(run.segments)
     header: dict[str, Any] = {
@@ -184,7 +184,7 @@ def save(run: Histories, path: Path, **told: Any) -> None:
         "entered": sorted({event.state for event in run.events}),
         "questions": questions_of(run),
         "states": [level.states for level in levels],
-        **told,
+        **facts,
     }
     arrays: dict[str, Any] = {"header": np.array(json.dumps(header))}
     arrays |= segment_arrays(run.segments, numbers) | event_arrays(run.events, elements, header["entered"])
@@ -198,7 +198,7 @@ def save(run: Histories, path: Path, **told: Any) -> None:
 def load_trajectory(path: str | Path) -> SavedTrajectory:
     """A trajectory that ``Trajectory.save`` has written, to be evaluated.
 
-    Needs nothing of the model that was run; the file holds no code.
+    Needs no model; the file holds no code.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def load_trajectory(path: str | Path) -> SavedTrajectory:
     Raises
     ------
     MultiPhiValueError
-        Naming a file that is not there, not whole or of another kind.
+        For a file that is missing, incomplete or of another kind.
 
     Examples
     --------
@@ -237,13 +237,13 @@ def load_trajectory(path: str | Path) -> SavedTrajectory:
         if header["format"] != FORMAT:
             raise ValueError(f"it has format {header['format']}, this version reads {FORMAT}")
         return _loaded(header, arrays)
-    except Exception as error:  # whatever a file that is cut short or of another kind leads its reader to
+    except Exception as error:  # any error of the reader of a file that is cut short or of another kind
         cause = " ".join(str(error).split()) or type(error).__name__
         raise MultiPhiValueError(f"path: got {str(path)!r}, need a file of Trajectory.save: {cause}") from error
 
 
 def _loaded(header: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> SavedTrajectory:
-    questions = [tuple(question) for question in header["questions"]]
+    questions = [tuple(quantity) for quantity in header["questions"]]
     levels = [level_from(tuple(states), questions, arrays, f"level{i}_") for i, states in enumerate(header["states"])]
     return SavedTrajectory(
         segments=segments_from(levels, arrays),
@@ -256,12 +256,3 @@ def _loaded(header: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> Save
         stats=Statistics(**header["stats"]),
         header=header,
     )
-
-
-# ---------------------------------------------------------------------- levels
-
-
-# ---------------------------------------------------------------------- segments
-
-
-# ---------------------------------------------------------------------- events

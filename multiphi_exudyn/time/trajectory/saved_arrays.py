@@ -1,4 +1,4 @@
-"""Levels, segments and events of a saved run as plain arrays, and back (saved.py lists the arrays)."""
+"""Saved arrays: levels, segments and events of a saved run as plain arrays, and back (saved.py lists them)."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ STRAIN = tuple(field.name for field in dataclasses.fields(StrainForm))
 
 @dataclass(frozen=True)
 class SavedLevel:
-    """What histories need of a level: rows and holds by (question, name); saved.py lists its arrays."""
+    """Level of a saved run, for histories: rows and holds by (quantity, name); saved.py lists its arrays."""
 
     states: tuple[int, ...]
     shapes: np.ndarray
@@ -61,16 +61,16 @@ class SavedLevel:
 
 
 def questions_of(run: Histories) -> list[tuple[str, str]]:
-    """(question, name) of every row that is kept of a level."""
+    """(quantity, name) of every saved row of a level."""
     return [
         *(("at", name) for name in run.points),
-        *((question, name) for name in run.contacts for question in CONTACT),
-        *((question, name) for name in (*run.frictions, *run.rubbing) for question in FRICTION),
+        *((quantity, name) for name in run.contacts for quantity in CONTACT),
+        *((quantity, name) for name in (*run.frictions, *run.rubbing) for quantity in FRICTION),
     ]
 
 
 def levels_of(segments: Sequence[Segment]) -> tuple[list[Any], list[int]]:
-    """The levels of segments, each once, and which of them every segment has."""
+    """The levels of segments, each once, and the index of the level of every segment."""
     places: dict[tuple[int, ...], int] = {}
     levels, numbers = list[Any](), list[int]()
     for segment in segments:
@@ -82,11 +82,11 @@ def levels_of(segments: Sequence[Segment]) -> tuple[list[Any], list[int]]:
 
 
 def level_arrays(run: Histories, level: Any) -> dict[str, np.ndarray]:
-    """What a level is saved as, by names that its number begins."""
+    """Arrays of a level by their names, which follow the prefix with its number."""
     width, questions = level.width, questions_of(run)
-    rows = [run._row(question, name)(level) for question, name in questions]
-    asked = {"contact_force": "contact_intervals", "friction_force": "stick_intervals"}
-    holds = [question in asked and run._holds(asked[question], name)(level) for question, name in questions]
+    rows = [run._row(quantity, name)(level) for quantity, name in questions]
+    closed = {"contact_force": "contact_intervals", "friction_force": "stick_intervals"}
+    holds = [quantity in closed and run._holds(closed[quantity], name)(level) for quantity, name in questions]
     form = level.strain_form
     return {
         "shapes": run._motion(level, np.eye(width)),
@@ -101,7 +101,7 @@ def level_arrays(run: Histories, level: Any) -> dict[str, np.ndarray]:
 def level_from(
     states: tuple[int, ...], questions: list[Any], arrays: Mapping[str, np.ndarray], prefix: str
 ) -> SavedLevel:
-    """A level out of the arrays whose names begin with ``prefix``."""
+    """Level from the arrays whose names begin with ``prefix``."""
 
     def of(name: str) -> np.ndarray:
         return arrays[prefix + name]
@@ -119,7 +119,7 @@ def level_from(
 
 
 def segment_arrays(segments: Sequence[Segment], numbers: Sequence[int]) -> dict[str, np.ndarray]:
-    """What segments are saved as; numbers: of their levels."""
+    """Arrays of segments; numbers: of their levels."""
     bases = [segment.basis for segment in segments]
     return {
         "segment_start": np.array([segment.start for segment in segments]),
@@ -135,30 +135,30 @@ def segment_arrays(segments: Sequence[Segment], numbers: Sequence[int]) -> dict[
 
 
 def segments_from(levels: Sequence[Any], arrays: Mapping[str, np.ndarray]) -> tuple[Segment, ...]:
-    """Segments out of the arrays."""
+    """Segments from the arrays."""
     counts, owners = arrays["term_count"].tolist(), arrays["segment_level"].tolist()
     terms = pairwise(accumulate(counts, initial=0))
     sizes = [levels[owner].width * count for owner, count in zip(owners, counts, strict=True)]
     blocks = pairwise(accumulate(sizes, initial=0))
-    found = []
+    segments = []
     for k, ((first, last), (begin, end)) in enumerate(zip(terms, blocks, strict=True)):
         basis = Exponentials(arrays["rate"][first:last], arrays["power"][first:last], float(arrays["unit"][k]))
         shapes = arrays["coefficient"][begin:end].reshape(-1, counts[k])
         flow = Flow(basis, shapes, np.ones(counts[k]), int(arrays["free"][k]))
         spans = float(arrays["segment_start"][k]), float(arrays["segment_end"][k])
-        found.append(Segment(*spans, levels[owners[k]], flow, phases=(), armed_at=0.0))
-    return tuple(found)
+        segments.append(Segment(*spans, levels[owners[k]], flow, phases=(), armed_at=0.0))
+    return tuple(segments)
 
 
 def elements_of(events: Sequence[Event]) -> Iterator[str]:
-    """Names of whatever changes: force laws are no contacts that are asked for."""
+    """Names of the elements of events, force laws included."""
     for event in events:
         yield event.contact
         yield from (name for name, _ in event.shared)
 
 
 def event_arrays(events: Sequence[Event], elements: Sequence[str], entered: Sequence[str]) -> dict[str, np.ndarray]:
-    """What events are saved as; elements, entered: the names that they refer to by place."""
+    """Arrays of events; elements, entered: the names that they refer to by index."""
     place = {name: i for i, name in enumerate(elements)}
     shared = [(k, place[name], push) for k, event in enumerate(events) for name, push in event.shared]
     return {
@@ -173,7 +173,7 @@ def event_arrays(events: Sequence[Event], elements: Sequence[str], entered: Sequ
 
 
 def events_from(header: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> tuple[Event, ...]:
-    """Events out of the arrays."""
+    """Events from the arrays."""
     elements, shared = header["elements"], dict[int, list[tuple[str, float]]]()
     for k, place, push in arrays["shared"].tolist():
         shared.setdefault(int(k), []).append((elements[int(place)], push))

@@ -1,8 +1,8 @@
-"""Trajectory: what a simulation leaves, as analytic segments that can be asked at any time (eq. 38.4).
+"""Trajectory: the result of a simulation, analytic segments that are evaluated at any time (eq. 38.4).
 
-Histories are asked for as histories.py says. Energies come from two independent sides: the ledger adds what was lost
-(impacts, truncation, damping, the last in closed form, work_sums.py) and what loads did; its residual is the
-difference to kinetic + strain.
+Its histories are those of histories.py. Energies come from two independent sides: the ledger adds the losses (impacts,
+truncation, damping, the last in closed form, work_sums.py) and the work of loads; its residual is the difference to
+kinetic + strain energy.
 """
 
 from __future__ import annotations
@@ -25,55 +25,55 @@ from multiphi_exudyn.events.transitions.state import Event, Loss, Phase, State, 
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.time.segments.segment import Segments
-from multiphi_exudyn.time.trajectory.final_state import Ending
+from multiphi_exudyn.time.trajectory.final_state import FinalState
 from multiphi_exudyn.time.trajectory.histories import INSTANTS
 from multiphi_exudyn.time.trajectory.ledger import Ledger, Statistics, ledger_of
 from multiphi_exudyn.time.trajectory.model_histories import ModelHistories
 from multiphi_exudyn.time.trajectory.saved import save
 
-__all__ = ["Again", "Trajectory"]
+__all__ = ["Rerun", "Trajectory"]
 
-NUDGE = 1e-12  # of the largest speed: more than round-off makes of a run, less than anybody knows of a start
-Again: TypeAlias = "Callable[[np.ndarray, np.ndarray], Trajectory]"
+PERTURBATION = 1e-12  # of the largest velocity: above round-off, below the accuracy of a start
+Rerun: TypeAlias = "Callable[[np.ndarray, np.ndarray], Trajectory]"
 
 
 @dataclass(frozen=True, repr=False)
 class Trajectory(ModelHistories):
-    """Result of ``simulate``: a motion in analytic pieces that answers at any time, and what is known about it.
+    """Result of ``simulate``: a motion in analytic segments, with its events, energies and warnings.
 
         x(t) = Phi_l eta(t) + x_inf,l,   eta(t) = Re V (c exp(lambda (t - t_k)))   on [t_k, t_k+1]
 
-    Ask it for ``displacement``, ``velocity``, ``acceleration``, ``at`` a point, ``gap``, ``contact_force``,
-    ``contact_impulse``, ``contact_intervals``, ``friction_force``, ``slip``, ``stick_intervals`` and ``energy``; for a
-    table by ``to_dataframe``, a figure by ``plot``. Times [s] are scalars or (k,); at an event ``side`` chooses the
+    Histories: ``displacement``, ``velocity``, ``acceleration``, ``at`` a point, ``gap``, ``contact_force``,
+    ``contact_impulse``, ``contact_intervals``, ``friction_force``, ``slip``, ``stick_intervals``, ``energy``; a table
+    by ``to_dataframe``, a figure by ``plot``. Times [s] are scalars or (k,); at an event ``side`` chooses the
     limit from the "right" (default) or the "left".
 
     Attributes
     ----------
     model : MultiPhiModel
-        What was run; with the modes that were decided where it had a ``Tolerance``.
+        The model of the run, with the decided modes where it had a ``Tolerance``.
     segments : sequence of Segment
-        The pieces, each within one level.
+        The motion, each segment within one level.
     events : sequence of Event
         In order of time.
     t_end : float
-        How far it goes [s].
+        End of the motion [s].
     status : str
         "ok" or "failed".
     message : str
         The cause of a failure.
     start : Start
-        Displacement, velocity and states that it begins with, in base coordinates.
-    ending : Ending
-        Where the loop has stopped.
+        Displacement, velocity and states at the start, in base coordinates.
+    ending : FinalState
+        State, sums and counts at the end.
     load : array (m,)
         The static load in base coordinates.
     warnings : tuple of str
-        What to distrust in this answer and what to do about it, one sentence each that begins with its kind and a
+        What to distrust in this result and what to do about it, one sentence each that begins with its kind and a
         colon: truncated contact, truncated friction, lost energy, truncation, undamped modes, damping ratios, missing
         modes, linear range, cluster, base, load pieces.
     again : callable
-        The same run from other y, y' (m,), without warnings.
+        Function that repeats the run from other y, y' (m,), without warnings.
 
     Examples
     --------
@@ -100,10 +100,10 @@ class Trajectory(ModelHistories):
     status: str
     message: str
     start: Start
-    ending: Ending
+    ending: FinalState
     load: np.ndarray
     warnings: tuple[str, ...] = ()
-    again: Again | None = field(default=None, repr=False, compare=False)
+    again: Rerun | None = field(default=None, repr=False, compare=False)
 
     def _facts(self) -> Iterator[tuple[str, str]]:
         yield "status", f"{self.status}{f', {self.message}' if self.message else ''}"
@@ -117,21 +117,21 @@ class Trajectory(ModelHistories):
 
     @property
     def t_start(self) -> float:
-        """When it begins [s]."""
+        """Start of the motion [s]."""
         return self.start.time
 
     @property
     def start_loss(self) -> Loss:
-        """Energies [J] that the start itself took."""
+        """Energies [J] lost at the start itself."""
         return self.ending.start_loss
 
     @functools.cached_property
     def final(self) -> State | None:
-        """The state it ends in, after whatever happened at that instant; None for a run that never began."""
+        """Final state, after the events at its instant; None for a run that failed at its start."""
         return self.ending.state if self.segments else None
 
     def ending_in(self, state: State) -> Trajectory:
-        """The same with another final state."""
+        """Return a copy with another final state."""
         return dataclasses.replace(self, ending=self.ending.at(state))
 
     @property
@@ -142,26 +142,26 @@ class Trajectory(ModelHistories):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion to an .npz file without pickled objects, which ``load_trajectory`` reads.
 
-        What is loaded answers all questions about histories, events and energies; it cannot be continued. The file has
-        n numbers for each mode of each level that was visited, and appears whole or not at all.
+        The loaded trajectory has all histories, events and energies; it cannot be continued. The file has n numbers for
+        each mode of each visited level, and is written completely or not at all.
 
         Parameters
         ----------
         path : str or path
             Of the file.
         """
-        told = {"status": self.status, "message": self.message, "warnings": self.warnings}
+        status = {"status": self.status, "message": self.message, "warnings": self.warnings}
         ledger = dataclasses.asdict(self.ledger) if self.segments else None
-        save(self, Path(path), **told, ledger=ledger, stats=self.stats._asdict())
+        save(self, Path(path), **status, ledger=ledger, stats=self.stats._asdict())
 
     @property
     def ledger(self) -> Ledger:
-        """Where the energy went [J]; computed when it is asked for.
+        """Energy balance of the run [J], computed when it is read.
 
         Raises
         ------
         NumericalFailure
-            For a run that failed at its start, and so has none.
+            For a run that failed at its start and has no motion.
         """
         if not self.segments:
             raise NumericalFailure(f"ledger: got a run without motion ({self.message}), need one that has started")
@@ -178,14 +178,14 @@ class Trajectory(ModelHistories):
 
     @property
     def initial_energy(self) -> float:
-        """Kinetic and strain energy [J] at the start, which of a run that sets out the loop has."""
+        """Kinetic and strain energy [J] at the start."""
         state = self.start.state
         return self.ending.given_energy if state is None else state.level.energy(state.displacement, state.velocity)
 
     def deepest_gap(self, contact: str, samples: int = 20) -> float:
-        """Smallest gap [m] of a contact while it is open, 0.0 where truncation left none below zero.
+        """Smallest gap [m] of a contact while it is open, 0.0 where truncation leaves no gap below zero.
 
-        Looked for where the event rule let the gap be negative, ``samples`` in the shortest period of the level and at
+        Sampled where the event rule accepts a negative gap, ``samples`` in the shortest period of the level and at
         least as many in a segment.
 
         Raises
@@ -197,18 +197,18 @@ class Trajectory(ModelHistories):
         depth = 0.0
         for segment in self.segments:
             exits = [k for k, (element, _) in enumerate(exits_of(segment.level)) if element == i]
-            waits = any(segment.phases[k] is not Phase.ARMED for k in exits)
-            if waits and set(self.model.pressing_links(i)).isdisjoint(segment.level.level.indices):
+            unarmed = any(segment.phases[k] is not Phase.ARMED for k in exits)
+            if unarmed and set(self.model.pressing_links(i)).isdisjoint(segment.level.level.indices):
                 depth = min(depth, float(np.min(segment.gaps(i, segment.unarmed_times(samples)))))
         return depth
 
     def horizon(self, tolerance: float = 0.01) -> float:
-        """Sensitivity horizon [s]: until when runs nudged at their start stay within ``tolerance`` of this one.
+        """Sensitivity horizon [s]: time until which perturbed runs stay within ``tolerance`` of this one.
 
-        No answer beyond it is to be compared point by point: round-off would change it as much. The nudges are +-1e-12
-        of the speeds y' that the run has where it is fastest, added to those it starts with; the distance is that of y,
-        in the norm of the mass matrix, relative to the largest |y| of the run. t_end where it never exceeds the
-        tolerance. A nudged run that fails tells nothing beyond its end. Costs two more runs.
+        Beyond it motions cannot be compared point by point: round-off would change them as much. The perturbations are
+        +-1e-12 of the velocities y' where the run is fastest, added to those at the start; the distance is that of y,
+        in the norm of the mass matrix, relative to the largest |y| of the run. The horizon is t_end where the distance
+        never exceeds the tolerance, and no later than the end of a perturbed run that fails. Costs two more runs.
 
         Parameters
         ----------
@@ -239,17 +239,17 @@ class Trajectory(ModelHistories):
             raise MultiPhiValueError(f"tolerance: got {tolerance!r}, need a number between 0 and 1")
         if not self.segments or self.again is None:
             raise NumericalFailure(f"horizon: got a run without motion ({self.message}), need one that has started")
-        times = self._instants
-        own, speeds = self._coordinates(times), self.model.base.coordinates(self.velocity(times))
-        nudge = NUDGE * speeds[:, int(np.argmax(np.linalg.norm(speeds, axis=0)))]
+        times = self._comparison_times
+        y, speeds = self._coordinates(times), self.model.base.coordinates(self.velocity(times))
+        perturbation = PERTURBATION * speeds[:, int(np.argmax(np.linalg.norm(speeds, axis=0)))]
         start = self.start
-        runs = [self.again(start.displacement, start.velocity + sign * nudge) for sign in (1, -1)]
-        limit = tolerance * float(np.max(np.linalg.norm(own, axis=0)))
-        whole = [run for run in runs if run.status == self.status] or runs
-        return min(_parted(run, times, own, limit) for run in whole)
+        runs = [self.again(start.displacement, start.velocity + sign * perturbation) for sign in (1, -1)]
+        limit = tolerance * float(np.max(np.linalg.norm(y, axis=0)))
+        completed = [run for run in runs if run.status == self.status] or runs
+        return min(_first_distance_above(run, times, y, limit) for run in completed)
 
     @property
-    def _instants(self) -> np.ndarray:
+    def _comparison_times(self) -> np.ndarray:
         """Times (k,) [s] at which runs are compared: evenly spaced, and the events."""
         even = np.linspace(self.start.time, self.t_end, INSTANTS)
         return np.union1d(even, event_table(self.events, self.model.index)[:, 0])
@@ -259,9 +259,9 @@ class Trajectory(ModelHistories):
         return self.model.base.coordinates(self.displacement(times))
 
 
-def _parted(run: Trajectory, times: np.ndarray, expected: np.ndarray, limit: float) -> float:
-    """First of the times (k,) [s] at which a run is over ``limit`` from y (m, k), or has ended; else the last."""
-    reached = int(np.sum(times <= run.t_end))
-    apart = np.linalg.norm(run._coordinates(times[:reached]) - expected[:, :reached], axis=0)
-    first = int(np.argmax(apart > limit)) if np.any(apart > limit) else min(reached, len(times) - 1)
+def _first_distance_above(run: Trajectory, times: np.ndarray, expected: np.ndarray, limit: float) -> float:
+    """First of the times (k,) [s] at which a run is over ``limit`` from y (m, k) or has ended; else the last."""
+    count = int(np.sum(times <= run.t_end))
+    distances = np.linalg.norm(run._coordinates(times[:count]) - expected[:, :count], axis=0)
+    first = int(np.argmax(distances > limit)) if np.any(distances > limit) else min(count, len(times) - 1)
     return float(times[first])

@@ -1,4 +1,4 @@
-"""What to distrust in a model or in its levels, known before any run comes there; run_warnings.py lists the kinds."""
+"""Model warnings: what to distrust in a model or its levels, known before a run; run_warnings.py lists the kinds."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from multiphi_exudyn.mechanics.modal_structure import ModalStructure
 
 __all__ = ["REMEDY", "cluster_warnings", "damping_warnings", "missing_modes", "static_warnings"]
 
-PER_CENT = 0.5  # a ratio of a structure is below 0.1 mostly, and half of critical is hardly an oscillation any more
-STICKING = 8  # modes beside friction that sticks: from there on its force is right to 5 % on the rig's beam
+PER_CENT = 0.5  # a ratio of a structure is mostly below 0.1, and half of critical damping hardly leaves an oscillation
+STICKING = 8  # modes of a level in which friction sticks: with so many its force is right to 5 % on the rig's beam
 REMEDY = "give the model more modes, or modes=Tolerance(0.01)"
 
 
 def static_warnings(levels: Sequence[Level]) -> Iterator[str]:
-    """Of the contact of which the modes of these levels leave out most of the static flexibility."""
+    """Warning of the contact with the largest share of static flexibility that the modes of these levels leave out."""
     yield from _sticking(levels)
     held = {link.name for level in levels[:1] for link in level.base.links if link.held}
     shares = [
@@ -42,22 +42,22 @@ def static_warnings(levels: Sequence[Level]) -> Iterator[str]:
 
 
 def _sticking(levels: Sequence[Level]) -> Iterator[str]:
-    """Of friction that sticks in a level of few modes, which leave out much of its flexibility there."""
-    found: dict[str, int] = {}
+    """Warning of friction that sticks in a level of few modes, which leave out much of its flexibility there."""
+    fewest: dict[str, int] = {}
     for level in levels:
         for link in (level.base.links[i] for i in level.indices if level.modes < STICKING):
             if link.held and (link.rigid or level.static_shares.get(link.name, 0.0) >= CONTACT_SHARE):
-                found[link.name] = min(level.modes, found.get(link.name, STICKING))
-    if found:
-        names = ", ".join(repr(name) for name in found)
+                fewest[link.name] = min(level.modes, fewest.get(link.name, STICKING))
+    if fewest:
+        names = ", ".join(repr(name) for name in fewest)
         yield (
-            f"truncated friction: only {min(found.values())} modes are kept while {names} sticks, so its force may be "
+            f"truncated friction: only {min(fewest.values())} modes are kept while {names} sticks, so its force may be "
             f"off by 5 % and more until it slips; {REMEDY}"
         )
 
 
 def damping_warnings(model: MultiPhiModel) -> Iterator[str]:
-    """Of modal ratios that end before the modes do, or look like per cent."""
+    """Warnings of fewer modal ratios than modes, and of ratios that look like per cent."""
     damping = model.structure.damping
     if not isinstance(damping, ModalDamping):
         return
@@ -75,41 +75,42 @@ def damping_warnings(model: MultiPhiModel) -> Iterator[str]:
 
 
 def missing_modes(model: MultiPhiModel) -> Iterator[str]:
-    """Of what acts on a structure of modes at points of which no static flexibility is known."""
+    """Warning of contacts on a structure of modes at points without a known static flexibility."""
     structure = model.structure
     if not isinstance(structure, ModalStructure):
         return
     names = [link.name for link in model.contacts]
     places = [{at} if isinstance(at, str) else {*at} for at in (link.direction for link in model.contacts)]
-    told = dict.fromkeys(name for name, points in zip(names, places, strict=True) if not points <= structure.completed)
-    if told:
+    lacking = [name for name, points in zip(names, places, strict=True) if not points <= structure.completed]
+    affected = list(dict.fromkeys(lacking))
+    if affected:
         yield (
             f"missing modes: the structure has only its modes up to {structure.highest:g} Hz, so "
-            f"{', '.join(map(repr, told))} acts on too stiff a structure and its peak forces are not to be trusted"
-            f"{_swinging(model, [names.index(name) for name in told], structure.highest)}; give structure_from_modes "
-            "the static flexibility of these points (flexibility=)"
+            f"{', '.join(map(repr, affected))} acts on too stiff a structure and its peak forces are not to be trusted"
+            f"{_contact_frequency(model, [names.index(name) for name in affected], structure.highest)}; give "
+            "structure_from_modes the static flexibility of these points (flexibility=)"
         )
 
 
-def _swinging(model: MultiPhiModel, contacts: Sequence[int], highest: float) -> str:
-    """How high above the highest mode [Hz] given modes swing on the stiffest of some contacts: sqrt(k h.M^-1 h)."""
+def _contact_frequency(model: MultiPhiModel, contacts: Sequence[int], highest: float) -> str:
+    """Clause on the frequency sqrt(k h.M^-1 h) of the modes on the stiffest contact, where above the highest mode."""
     k, lengths = model.base.stiffnesses[contacts], model.base.lengths[contacts]
-    swinging = np.sqrt(np.where(np.isfinite(k) & (k > 0), k, 0.0)) * lengths / (2 * math.pi)
-    most = int(np.argmax(swinging))
-    if not 0 < highest < swinging[most]:
+    frequencies = np.sqrt(np.where(np.isfinite(k) & (k > 0), k, 0.0)) * lengths / (2 * math.pi)
+    most = int(np.argmax(frequencies))
+    if not 0 < highest < frequencies[most]:
         return ""
-    return f" (on {k[most]:g} N/m these modes swing at up to {swinging[most]:.3g} Hz, where others would as well)"
+    return f" (on {k[most]:g} N/m these modes swing at up to {frequencies[most]:.3g} Hz, where others would as well)"
 
 
 def cluster_warnings(levels: Sequence[Level]) -> list[str]:
-    """One sentence where some of these levels keep modes beyond those asked for."""
+    """One sentence where some of these levels keep more modes than requested."""
     kept = [level for level in levels if level.kept_beyond]
     if not kept:
         return []
     most = max(kept, key=lambda level: level.kept_beyond)
-    asked, name = most.modes - most.kept_beyond, ", ".join(most.closed) or "open"
+    count, name = most.modes - most.kept_beyond, ", ".join(most.closed) or "open"
     return [
         f"cluster: {len(kept)} of {len(levels)} levels keep more modes than asked for, level ({name}) {most.modes} in "
-        f"place of {asked}, as a cut between modes of one frequency ({most.frequencies[asked - 1]:.6g} Hz) would be "
+        f"place of {count}, as a cut between modes of one frequency ({most.frequencies[count - 1]:.6g} Hz) would be "
         f"arbitrary; ask for {most.modes} modes"
     ]
