@@ -38,7 +38,7 @@ from multiphi_exudyn.mathematics.eigenproblems.modes import (
     round_off_energy,
 )
 
-__all__ = ["ACCURATE", "HeldRows", "LowestModes", "left_out", "lowest_modes"]
+__all__ = ["ACCURATE", "HeldRows", "LowestModes", "lowest_modes", "missing_flexibility"]
 
 ACCURATE = 1e-9  # error of omega^2 of sample levels, up to which Krylov vectors are added
 DEEPEST = 8  # blocks of Krylov vectors at most
@@ -101,7 +101,7 @@ def lowest_modes(
     return LowestModes(modes, len(found.values), error)
 
 
-def left_out(mass: Any, stiffness: Any, modes: Modes, rows: np.ndarray) -> np.ndarray:
+def missing_flexibility(mass: Any, stiffness: Any, modes: Modes, rows: np.ndarray) -> np.ndarray:
     """Share (k,) of the static flexibility h.K^-1 h, or h.A^-1 h, of rows (k, n) that modes do not hold."""
     mass, stiffness = scipy.sparse.csc_array(mass), scipy.sparse.csc_array(stiffness)
     shift = float(modes.omega[modes.rigid]) ** 2 if modes.rigid else 0.0
