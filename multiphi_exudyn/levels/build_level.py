@@ -16,7 +16,7 @@ from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.level_modes import level_modes
 from multiphi_exudyn.levels.modal_base import INTERLACING, ModalBase
 from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
-from multiphi_exudyn.mathematics.eigenproblems.modes import turned
+from multiphi_exudyn.mathematics.eigenproblems.modes import aligned_modes
 from multiphi_exudyn.mathematics.eigenproblems.orthonormal import least_squares, orthonormal
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 
@@ -77,7 +77,7 @@ def _aligned(
     """
     rows, sizes = base.observed_rows
     if squares.all():
-        return turned(squares, vectors, rows, sizes)
+        return aligned_modes(squares, vectors, rows, sizes)
     free = np.flatnonzero(squares == 0)
     squares, vectors, row_values = squares.copy(), vectors.copy(), np.empty((len(rows), len(squares)))
     rates, rotation = np.linalg.eigh(vectors[:, free].T @ base.damped(vectors[:, free], closed))
@@ -85,7 +85,9 @@ def _aligned(
     if 0 < drifting < len(free):
         vectors[:, free] = vectors[:, free] @ rotation
     for part in (free[:drifting], free[drifting:], np.flatnonzero(squares)):
-        squares[part], vectors[:, part], row_values[:, part] = turned(squares[part], vectors[:, part], rows, sizes)
+        squares[part], vectors[:, part], row_values[:, part] = aligned_modes(
+            squares[part], vectors[:, part], rows, sizes
+        )
     return squares, vectors, row_values
 
 

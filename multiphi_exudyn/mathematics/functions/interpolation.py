@@ -4,9 +4,9 @@
 
 Pieces are interpolated at Chebyshev points of the second kind, their ends among them, and halved until the interpolant
 agrees with the function at the points midway between, and at samples of the whole interval that are spread unevenly,
-the multiples of the golden ratio: no periodic function hides from them. What is shorter than the gaps between the
-samples, 1.2 / number of them, may not be seen at all. A piece that stays in doubt is searched for a jump or a kink
-(corners.py), and the pieces are made again with that instant as an end.
+the multiples of the golden ratio: no periodic function hides from them. Details shorter than the gaps between the
+samples, 1.2 / number of them, may be missed. A piece that does not converge is searched for a jump or a kink
+(corners.py), and the pieces are built again with that instant as an end.
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice, 2013, ch. 2 and 16; V. T. Sos, On the
 distribution mod 1 of the sequence n alpha, Ann. Univ. Sci. Budapest 1 (1958) 127.
 """
@@ -27,13 +27,13 @@ from multiphi_exudyn.mathematics.functions.corners import INSTANT, corners_in, d
 __all__ = ["DEGREE", "FEW_SAMPLES", "MANY_SAMPLES", "MOST_PIECES", "Function", "Interpolant", "Samples", "interpolated"]
 
 DEGREE = 8  # of the polynomials that stand for smooth functions
-MOST_PIECES = 2**18  # a function that needs more is not smooth at the asked tolerance
+MOST_PIECES = 2**18  # a function that needs more is not smooth at the given tolerance
 FIRST_PIECES = 64  # into which a function's interval is divided before any comparison
-ROUND_OFF = 1e-13  # of the largest value: no interpolant is asked to come closer
-SHORT = 2**-10  # of a first piece: one that is still in doubt may hold a corner
-MOST_CORNERS = 2**12  # looked for at once: where more pieces are in doubt, the function is not resolved yet
-IMPULSE = 1 / MOST_PIECES  # of tolerance times interval: in integral a piece may be off by that, all by no more than it
-PASSES = 8  # in which corners are looked for: in round-off there is always one more
+ROUND_OFF = 1e-13  # of the largest value: least tolerance of an interpolant
+SHORT = 2**-10  # of a first piece: one that has not converged may contain a corner
+MOST_CORNERS = 2**12  # at once: with more pieces that have not converged, the function is not resolved yet
+IMPULSE = 1 / MOST_PIECES  # of tolerance times interval: allowed error of the integral of a piece
+PASSES = 8  # that search corners: round-off would give one more each time
 MANY_SAMPLES = 28657  # of a function that takes many times at once; Fibonacci numbers divide most evenly
 FEW_SAMPLES = 10946  # of one that takes single times, a microsecond or more each
 
@@ -49,25 +49,25 @@ class Samples:
 
     @classmethod
     def of(cls, function: Function, end: float, count: int = MANY_SAMPLES) -> Samples:
-        """So many samples, spread over [0, end] as multiples of the golden ratio."""
+        """Return ``count`` samples, spread over [0, end] as multiples of the golden ratio."""
         times = end * np.sort(np.arange(0.5, count) * ((math.sqrt(5) - 1) / 2) % 1.0)
         return cls(times, function(np.concatenate([times, [0.0, end]]))[:-2])  # at the ends a number is enough
 
     @property
     def largest(self) -> float:
-        """The largest |u|."""
+        """Largest |u|."""
         return float(np.max(np.abs(self.values), initial=0.0))
 
     def errors(self, lefts: np.ndarray, rights: np.ndarray, carriers: np.ndarray, series: np.ndarray) -> np.ndarray:
-        """Largest distance (n,) of the samples from the Chebyshev series of pieces, which do not overlap."""
+        """Return the largest distance (n,) of the samples from the Chebyshev series of pieces, which do not overlap."""
         order, errors = np.argsort(lefts), np.zeros(len(lefts))
         owner = order[np.maximum(np.searchsorted(lefts[order], self.times, side="right") - 1, 0)]
         inside = (self.times >= lefts[owner]) & (self.times < rights[owner])
         owner, t = owner[inside], self.times[inside]
         places = 2 * (t - lefts[owner]) / (rights[owner] - lefts[owner]) - 1
-        found = np.sum(chebyshev.chebvander(places, DEGREE) * series[owner], axis=1)
-        found = found * np.exp(1j * carriers[owner] * (t - lefts[owner]))
-        np.maximum.at(errors, owner, np.abs(found - self.values[inside]))
+        approximated = np.sum(chebyshev.chebvander(places, DEGREE) * series[owner], axis=1)
+        approximated = approximated * np.exp(1j * carriers[owner] * (t - lefts[owner]))
+        np.maximum.at(errors, owner, np.abs(approximated - self.values[inside]))
         return errors
 
 
@@ -87,9 +87,9 @@ class Interpolant:
 def interpolated(
     function: Function, omega: Function, end: float, tolerance: float, samples: Samples, breaks: np.ndarray
 ) -> Interpolant:
-    """A function of (k,) times on [0, end] to ``tolerance``, in units of u, on pieces that ride on omega.
+    """Return the interpolant of a function of (k,) times on [0, end] to ``tolerance``, with carriers of frequency omega.
 
-    breaks: corners that are known. Raises NumericalFailure where no so many pieces are enough.
+    breaks: known corners. tolerance: in units of u. Raises NumericalFailure where MOST_PIECES are not enough.
     """
     corners = distinct(breaks, end)
     for searched in (*[True] * PASSES, False):
@@ -102,7 +102,7 @@ def interpolated(
 
 
 class _Pieces:
-    """Pieces on their way to a tolerance, between known corners."""
+    """Pieces between known corners, halved until they have a tolerance."""
 
     def __init__(
         self,
@@ -121,7 +121,7 @@ class _Pieces:
         self._left = 0.0
 
     def halved(self) -> np.ndarray:
-        """Halve pieces until they agree with the function; corners (k,) that were found on the way."""
+        """Halve pieces until they agree with the function; return the corners (k,) found meanwhile."""
         edges = self._first_edges()
         lefts, rights, count, found = edges[:-1], edges[1:], 0, list[np.ndarray]()
         while len(lefts):
