@@ -174,8 +174,8 @@ def test_a_contact_that_no_mode_moves_is_left_alone_unless_its_stop_moves_into_i
 
 
 def test_says_where_it_does_not_settle(monkeypatch):
-    for module in ("least_distance", "complementarity"):
-        monkeypatch.setattr(f"multiphi_exudyn.mathematics.{module}.SETS", 0)
+    for module in ("least_distance", "principal_pivoting"):
+        monkeypatch.setattr(f"multiphi_exudyn.mathematics.complementarity.{module}.SETS", 0)
     for solve in (least_distance, functools.partial(distance_in_buffers, run=as_they_are)):
         with pytest.raises(NumericalFailure, match="round-off decides"):
             solve(np.eye(2), np.ones(2), np.ones(2))

@@ -87,7 +87,7 @@ class Interpolant:
 def interpolated(
     function: Function, omega: Function, end: float, tolerance: float, samples: Samples, breaks: np.ndarray
 ) -> Interpolant:
-    """Return the interpolant of a function of (k,) times on [0, end] to ``tolerance``, with carriers of frequency omega.
+    """Return the interpolant of a function of (k,) times on [0, end] to ``tolerance``, with carriers omega.
 
     breaks: known corners. tolerance: in units of u. Raises NumericalFailure where MOST_PIECES are not enough.
     """
