@@ -92,10 +92,10 @@ def _structure_modes(base: ModalBase) -> Modes:
 def _sample_levels(stiffness: np.ndarray, modes: int) -> list[HeldRows]:
     """Return the levels on which a base is judged: one row alone, and ``modes`` rows spread over all of them."""
     count = len(stiffness)
-    alone = [[k] for k in sorted({0, count // 2, count - 1})] if count else []
+    single = [[k] for k in sorted({0, count // 2, count - 1})] if count else []
     together = np.unique(np.linspace(0, count - 1, min(count, modes)).astype(int)).tolist()
-    held = [*alone, together] if count > 1 else alone
-    return [HeldRows(rows, stiffness[rows], modes) for rows in held]
+    row_sets = [*single, together] if count > 1 else single
+    return [HeldRows(rows, stiffness[rows], modes) for rows in row_sets]
 
 
 def _largest_stiffness(contacts: Sequence[Element], same: np.ndarray) -> float:

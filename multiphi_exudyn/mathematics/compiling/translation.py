@@ -125,11 +125,11 @@ class _Constants(FunctionPass):
     def run_pass(self, state: Any) -> bool:
         """Replace numbers of the module by constants in every block."""
         for block in state.func_ir.blocks.values():
-            known = dict[str, float]()
+            numbers = dict[str, float]()
             for assignment in block.find_insts(statements.Assign):
-                number = _number(assignment.value, known)
+                number = _number(assignment.value, numbers)
                 if number is not None:  # a temporary, assigned once; variables are copies of temporaries
-                    known[assignment.target.name] = number
+                    numbers[assignment.target.name] = number
                     assignment.value = statements.Const(number, assignment.loc)
         return True
 

@@ -44,11 +44,11 @@ def least_distance(rows: np.ndarray, least: np.ndarray, sizes: np.ndarray) -> tu
         return _single(rows[0], float(least[0]), float(sizes[0]))
     lengths = np.linalg.norm(rows, axis=1)
     lengths[lengths == 0] = 1.0
-    units, wanted, sizes = rows / lengths[:, None], least / lengths, sizes / lengths
+    units, targets, sizes = rows / lengths[:, None], least / lengths, sizes / lengths
     x, active, shares = np.zeros(rows.shape[1]), list[int](), np.zeros(0)
     slack = np.full(len(least), ZERO)
     for _ in range(SETS * (len(least) + 1)):
-        violations, terms = wanted - units @ x, sizes + np.linalg.norm(x)
+        violations, terms = targets - units @ x, sizes + np.linalg.norm(x)
         violations[active] = 0.0
         violations[violations <= slack * terms] = 0.0
         if not np.any(violations):
@@ -63,7 +63,7 @@ def least_distance(rows: np.ndarray, least: np.ndarray, sizes: np.ndarray) -> tu
                 raise
             slack[entering] = FOLLOWING
             continue
-        x, shares = _solve_equalities(units[active], wanted[active])
+        x, shares = _solve_equalities(units[active], targets[active])
     raise NumericalFailure("least distance: round-off decides which inequalities are active")
 
 
@@ -117,8 +117,8 @@ def _split(units: np.ndarray, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     ) > INDEPENDENT else np.zeros_like(row)
 
 
-def _solve_equalities(units: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the shortest x with units x = wanted, and the shares of its rows, not below zero."""
+def _solve_equalities(units: np.ndarray, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the shortest x with units x = targets, and the shares of its rows, not below zero."""
     q, r = np.linalg.qr(units.T)
-    components = np.linalg.solve(r.T, wanted)
+    components = np.linalg.solve(r.T, targets)
     return q @ components, np.maximum(np.linalg.solve(r, components), 0.0)

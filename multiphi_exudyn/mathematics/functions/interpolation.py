@@ -92,12 +92,12 @@ def interpolated(
     breaks: known corners. tolerance: in units of u. Raises NumericalFailure where MOST_PIECES are not enough.
     """
     corners = distinct(breaks, end)
-    for searched in (*[True] * PASSES, False):
-        pieces = _Pieces(function, omega, end, tolerance, samples, corners, searched)
-        found = pieces.halved()
-        if not len(found):
+    for is_searched in (*[True] * PASSES, False):
+        pieces = _Pieces(function, omega, end, tolerance, samples, corners, is_searched)
+        new_corners = pieces.halved()
+        if not len(new_corners):
             break
-        corners = distinct(np.concatenate([corners, found]), end)
+        corners = distinct(np.concatenate([corners, new_corners]), end)
     return pieces.interpolant()
 
 
@@ -123,20 +123,20 @@ class _Pieces:
     def halved(self) -> np.ndarray:
         """Halve pieces until they agree with the function; return the corners (k,) found meanwhile."""
         edges = self._first_edges()
-        lefts, rights, count, found = edges[:-1], edges[1:], 0, list[np.ndarray]()
+        lefts, rights, count, corners = edges[:-1], edges[1:], 0, list[np.ndarray]()
         while len(lefts):
             carriers = self._omega((lefts + rights) / 2)
             series, errors = self._fit(lefts, rights, carriers)
-            close, impulses = errors <= self._allowed, errors * (rights - lefts)
-            good = close | (impulses <= IMPULSE * self._allowed * self._end)
-            self._worst = max(self._worst, float(np.max(errors[close], initial=0.0)))
-            self._left += float(np.sum(impulses[good & ~close]))
-            self._done.append(tuple(column[good] for column in (lefts, rights, carriers, series)))
-            count += int(np.sum(good))
-            lefts, rights = lefts[~good], rights[~good]
-            here = self._corners_in(lefts, rights)
-            found.append(here[np.isfinite(here)])
-            lefts, rights = lefts[np.isnan(here)], rights[np.isnan(here)]
+            is_close, impulses = errors <= self._allowed, errors * (rights - lefts)
+            is_good = is_close | (impulses <= IMPULSE * self._allowed * self._end)
+            self._worst = max(self._worst, float(np.max(errors[is_close], initial=0.0)))
+            self._left += float(np.sum(impulses[is_good & ~is_close]))
+            self._done.append(tuple(column[is_good] for column in (lefts, rights, carriers, series)))
+            count += int(np.sum(is_good))
+            lefts, rights = lefts[~is_good], rights[~is_good]
+            new_corners = self._corners_in(lefts, rights)
+            corners.append(new_corners[np.isfinite(new_corners)])
+            lefts, rights = lefts[np.isnan(new_corners)], rights[np.isnan(new_corners)]
             if count + 2 * len(lefts) > MOST_PIECES or np.any(rights - lefts <= INSTANT * self._end):
                 raise NumericalFailure(
                     f"function of time: not smooth enough for a tolerance of {self._tolerance:g} near t = "
@@ -145,7 +145,7 @@ class _Pieces:
                 )
             middles = (lefts + rights) / 2
             lefts, rights = np.concatenate([lefts, middles]), np.concatenate([middles, rights])
-        return np.concatenate(found)
+        return np.concatenate(corners)
 
     def interpolant(self) -> Interpolant:
         """The pieces, once they agree."""
@@ -171,18 +171,18 @@ class _Pieces:
     def _corners_in(self, lefts: np.ndarray, rights: np.ndarray) -> np.ndarray:
         """Corners of the pieces that are short enough to be searched for one, NaN elsewhere."""
         result = np.full(len(lefts), np.nan)
-        short = np.flatnonzero(rights - lefts <= SHORT * self._end / FIRST_PIECES)
-        if self._searched and 0 < len(short) <= MOST_CORNERS:
-            here = corners_in(self._function, lefts[short], rights[short], self._end, self._allowed)
-            known = np.concatenate([[0.0], self._corners, [self._end]])
-            apart = np.min(np.abs(here[:, None] - known), axis=1) > 2 * INSTANT * self._end
-            result[short] = np.where(apart, here, np.nan)
+        indices = np.flatnonzero(rights - lefts <= SHORT * self._end / FIRST_PIECES)
+        if self._searched and 0 < len(indices) <= MOST_CORNERS:
+            corners = corners_in(self._function, lefts[indices], rights[indices], self._end, self._allowed)
+            edges = np.concatenate([[0.0], self._corners, [self._end]])
+            apart = np.min(np.abs(corners[:, None] - edges), axis=1) > 2 * INSTANT * self._end
+            result[indices] = np.where(apart, corners, np.nan)
         return result
 
     def _fit(self, lefts: np.ndarray, rights: np.ndarray, carriers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Chebyshev series (n, D + 1) of every piece on its carrier, its error (n,) midway and at the samples."""
-        own, between, fitted, midway = _nodes()
-        values, checks = (self._sampled(lefts, rights, carriers, places) for places in (own, between))
+        points, between, fitted, midway = _nodes()
+        values, checks = (self._sampled(lefts, rights, carriers, places) for places in (points, between))
         self._size = max(self._size, float(np.max(np.abs(values))))
         series = (values @ fitted.T).astype(complex)
         errors = np.max(np.abs(series @ midway.T - checks), axis=1)
@@ -205,9 +205,9 @@ def _nodes() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Chebyshev points and midway points on [0, 1], values -> Chebyshev series, series -> values midway."""
     angles = np.linspace(math.pi, 0.0, 2 * DEGREE + 1)
     x = np.cos(angles)
-    own, between = x[::2], x[1::2]
-    fitted = np.linalg.inv(chebyshev.chebvander(own, DEGREE))
-    return (own + 1) / 2, (between + 1) / 2, fitted, chebyshev.chebvander(between, DEGREE)
+    points, between = x[::2], x[1::2]
+    fitted = np.linalg.inv(chebyshev.chebvander(points, DEGREE))
+    return (points + 1) / 2, (between + 1) / 2, fitted, chebyshev.chebvander(between, DEGREE)
 
 
 @functools.cache

@@ -41,12 +41,12 @@ def lightly_damped(squares: np.ndarray, damping: np.ndarray) -> ModalResponse | 
     if not start_pairs(numbers, r):
         return None
     rows = numbers.reshape(-1, r)
-    coupling, vectors, moved = rows[2 : 2 + r], rows[2 + r : 2 + 3 * r], rows[2 + 3 * r : 2 + 5 * r]
+    coupling, vectors, products = rows[2 : 2 + r], rows[2 + r : 2 + 3 * r], rows[2 + 3 * r : 2 + 5 * r]
     previous, reduction = 1.0, 0.0
     for _ in range(MOST_STEPS):
         step = improve_pairs(numbers, r)
         previous, reduction = step, max(reduction, step / previous)
-        vectors.dot(coupling, out=moved)
+        vectors.dot(coupling, out=products)
         if step * reduction <= LAST:
             return _response(numbers, r)
     return None

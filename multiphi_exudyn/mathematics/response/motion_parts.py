@@ -77,10 +77,10 @@ def parts_of(system: np.ndarray) -> Parts:
 
 
 def _single(system: np.ndarray, rates: np.ndarray, vectors: np.ndarray) -> Parts:
-    kept = rates.imag >= 0
-    inverse = _real_part_inverse(vectors[:, kept], rates[kept].imag > 0)
-    groups = tuple((i, i + 1) for i in range(int(np.sum(kept))))
-    return Parts(rates[kept], vectors[:, kept], inverse, np.diag(rates[kept]), groups)
+    is_upper = rates.imag >= 0
+    inverse = _real_part_inverse(vectors[:, is_upper], rates[is_upper].imag > 0)
+    groups = tuple((i, i + 1) for i in range(int(np.sum(is_upper))))
+    return Parts(rates[is_upper], vectors[:, is_upper], inverse, np.diag(rates[is_upper]), groups)
 
 
 def _clusters(rates: np.ndarray, distance: float) -> list[np.ndarray]:
