@@ -328,20 +328,20 @@ def two_processes(monkeypatch):
 
 def test_a_few_lines_are_compiled_by_one_process(monkeypatch):
     monkeypatch.setattr(compilation, "_most_processes", lambda: 2)
-    assert len(compilation.shares([square, turn, total])) == 1
+    assert len(compilation.work_shares([square, turn, total])) == 1
 
 
 @pytest.mark.usefixtures("two_processes")
 def test_processes_share_out_functions_by_their_work():
-    assert compilation.shares([square, turn, total]) == [[total], [turn, square]]
-    assert compilation.compile_elsewhere([turn, square]).keys() == {turn, square}
+    assert compilation.work_shares([square, turn, total]) == [[total], [turn, square]]
+    assert compilation.compile_in_process([turn, square]).keys() == {turn, square}
     assert Entry(total)(*buffers(), 4, 1.5) == pytest.approx(total(*buffers(), 4, 1.5), rel=1e-15)
 
 
 @pytest.mark.usefixtures("two_processes")
 def test_what_another_process_cannot_import_is_compiled_here():
     run = program()
-    assert compilation.compile_elsewhere([run.function]) == {}
+    assert compilation.compile_in_process([run.function]) == {}
     assert run(ONES) == 6.0
 
 
@@ -453,7 +453,6 @@ print(*sorted(one.function.__name__ for one in compiled._entries))
     names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert names == [
         "advance",
-        "bend_one",
         "clear",
         "describe_basis",
         "improve",
@@ -466,6 +465,7 @@ print(*sorted(one.function.__name__ for one in compiled._entries))
         "sample_rows",
         "sample_sizes",
         "sample_states",
+        "single_direction_response",
         "start",
         "step_is_clear",
         "unfold",

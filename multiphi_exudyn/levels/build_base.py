@@ -2,7 +2,7 @@
 
 A level of r modes takes them from the structure's lowest r + BEYOND modes and, for each contact, friction, load and
 point, from as many Krylov vectors (K^-1 M)^j K^-1 h as its frequencies need (lowest_modes.py). That is judged on
-samples: levels in which the first, a middle or the last contact holds alone, and one in which many do.
+samples: levels with the first, a middle or the last contact closed alone, and one with many contacts closed.
 """
 
 from __future__ import annotations
@@ -32,90 +32,92 @@ def build_base(
     structure: LinearStructure,
     contacts: Sequence[Element],
     modes: int | str,
-    less: ModalBase | None = None,
-    further: np.ndarray | None = None,
+    previous: ModalBase | None = None,
+    load_rows: np.ndarray | None = None,
 ) -> ModalBase:
-    """The base of a structure for levels with ``modes`` modes at most, all that it has for "all".
+    """Return the base for levels with ``modes`` modes at most, or with all modes for "all".
 
-    less: one of the same structure, whose own modes are not computed again. further: rows (k, n) that it is to hold
-    beside those of contacts and points, as loads have.
+    previous: a base of the same structure, whose modes are not computed again. load_rows: rows (k, n) of loads, which
+    the base represents like those of contacts and points.
     """
     links = links_of(contacts)
     rows = np.array([structure.row(link.direction) for link in links]).reshape(-1, structure.n)
-    pushed = np.array([_pushed(structure, link) for link in links]).reshape(-1, structure.n)
+    force_rows = np.array([_force_row(structure, link) for link in links]).reshape(-1, structure.n)
     points = structure.point_rows
-    further = np.zeros((0, structure.n)) if further is None else further
+    load_rows = np.zeros((0, structure.n)) if load_rows is None else load_rows
     complete = structure.n <= COMPLETE or modes == "all"
     if complete:
-        found = LowestModes(complete_modes(_dense(structure.mass), _dense(structure.stiffness)), structure.n, 0.0)
+        lowest = LowestModes(complete_modes(_dense(structure.mass), _dense(structure.stiffness)), structure.n, 0.0)
     else:
         first = np.array(parallel(rows.T), int)
         distinct = np.unique(first)
-        stiffness = np.array([_largest_stiffness(contacts, np.flatnonzero(first == own)) for own in distinct])
-        held = np.vstack([rows[distinct], points, further])
-        found = _small(structure, held, _samples(stiffness, int(modes)), int(modes), less)
-    own = found.modes.turned(points)
+        stiffness = np.array([_largest_stiffness(contacts, np.flatnonzero(first == index)) for index in distinct])
+        krylov_rows = np.vstack([rows[distinct], points, load_rows])
+        lowest = _incomplete_base_modes(
+            structure, krylov_rows, _sample_levels(stiffness, int(modes)), int(modes), previous
+        )
+    aligned = lowest.modes.turned(points)
     return ModalBase(
-        modes=own,
-        points=points @ own.shapes,
-        damping=_base_damping(structure, own),
-        directions=_seen(own, rows),
-        pushes=_seen(own, pushed),
+        modes=aligned,
+        points=points @ aligned.shapes,
+        damping=_base_damping(structure, aligned),
+        directions=_projected_rows(aligned, rows),
+        pushes=_projected_rows(aligned, force_rows),
         contacts=tuple(contacts),
         complete=complete,
         mass=structure.mass,
-        exact=found.exact,
-        served=own.count if complete else max(int(modes), found.exact - BEYOND),
-        further=further,
-        error=found.error,
+        exact_count=lowest.exact,
+        most_level_modes=aligned.count if complete else max(int(modes), lowest.exact - BEYOND),
+        load_rows=load_rows,
+        error=lowest.error,
     )
 
 
-def _small(
-    structure: LinearStructure, rows: np.ndarray, samples: Sequence[HeldRows], modes: int, less: ModalBase | None
+def _incomplete_base_modes(
+    structure: LinearStructure, rows: np.ndarray, samples: Sequence[HeldRows], modes: int, previous: ModalBase | None
 ) -> LowestModes:
-    """The lowest modes and the Krylov vectors of ``rows`` (k, n)."""
+    """Return the lowest modes and the Krylov vectors of ``rows`` (k, n)."""
     count = min(structure.n - 2, modes + BEYOND)
-    known = None if less is None or less.complete else _own(less)
-    return lowest_modes(structure.mass, structure.stiffness, count, rows, samples, known, least=min(modes, count))
+    known_modes = None if previous is None or previous.complete else _structure_modes(previous)
+    return lowest_modes(structure.mass, structure.stiffness, count, rows, samples, known_modes, least=min(modes, count))
 
 
-def _own(base: ModalBase) -> Modes:
-    """The structure's own modes in a base."""
+def _structure_modes(base: ModalBase) -> Modes:
+    """Return those modes of a base that are modes of the structure."""
     return dataclasses.replace(
-        base.modes, omega=base.modes.omega[: base.exact], shapes=base.modes.shapes[:, : base.exact]
+        base.modes, omega=base.modes.omega[: base.exact_count], shapes=base.modes.shapes[:, : base.exact_count]
     )
 
 
-def _samples(stiffness: np.ndarray, modes: int) -> list[HeldRows]:
-    """Levels on which a base is judged: one row held alone, and as many as there are modes, spread over all."""
+def _sample_levels(stiffness: np.ndarray, modes: int) -> list[HeldRows]:
+    """Return the levels on which a base is judged: one row alone, and ``modes`` rows spread over all of them."""
     count = len(stiffness)
-    alone = [[k] for k in sorted({0, count // 2, count - 1})] if count else []
+    single = [[k] for k in sorted({0, count // 2, count - 1})] if count else []
     together = np.unique(np.linspace(0, count - 1, min(count, modes)).astype(int)).tolist()
-    held = [*alone, together] if count > 1 else alone
-    return [HeldRows(rows, stiffness[rows], modes) for rows in held]
+    row_sets = [*single, together] if count > 1 else single
+    return [HeldRows(rows, stiffness[rows], modes) for rows in row_sets]
 
 
 def _largest_stiffness(contacts: Sequence[Element], same: np.ndarray) -> float:
-    """The largest stiffness [N/m] that an element has in one of its states in the direction of these links."""
+    """Return the largest stiffness [N/m] of an element in one of its states along the direction of links ``same``."""
     links, places = links_of(contacts), link_indices(contacts)
-    found = [
-        sum(links[own[k]].stiffness for k in state.holds if own[k] in same)
-        for element, own in zip(contacts, places, strict=True)
+    stiffnesses = [
+        sum(links[indices[k]].stiffness for k in state.holds if indices[k] in same)
+        for element, indices in zip(contacts, places, strict=True)
         for state in element.states
     ]
-    return max(*found, 0.0)
+    return max(*stiffnesses, 0.0)
 
 
-def _pushed(structure: LinearStructure, link: AnyLink) -> np.ndarray:
-    """The row (n,) along which a link's force acts."""
+def _force_row(structure: LinearStructure, link: AnyLink) -> np.ndarray:
+    """Return the row (n,) along which the force of a link acts."""
     if isinstance(link, Link) and link.push:
         return np.sum([share * structure.row(at) for share, at in link.push], axis=0)
     return structure.row(link.direction)
 
 
-def _seen(modes: Modes, rows: np.ndarray) -> np.ndarray:
-    """Rows (l, n) in base coordinates (m, l), zero where that is round-off."""
+def _projected_rows(modes: Modes, rows: np.ndarray) -> np.ndarray:
+    """Return rows (l, n) in base coordinates (m, l), with zeros in place of round-off."""
     return drop_round_off(modes.shapes.T @ rows.T, np.abs(modes.shapes.T) @ np.abs(rows.T))
 
 
@@ -124,13 +126,13 @@ def _dense(matrix: Matrix) -> np.ndarray:
 
 
 def _base_damping(structure: LinearStructure, modes: Modes) -> np.ndarray:
-    """Phi^T C Phi (m, m)."""
-    given = structure.damping
-    if given is None:
+    """Return the damping matrix Phi^T C Phi (m, m)."""
+    damping = structure.damping
+    if damping is None:
         return np.zeros((modes.count, modes.count))
-    if isinstance(given, ModalDamping):
-        return np.diag(2 * given.of(modes.count) * modes.omega)
-    if isinstance(given, RayleighDamping):
-        return np.diag(given.alpha + given.beta * modes.omega**2)
-    projected = modes.shapes.T @ (given @ modes.shapes)
+    if isinstance(damping, ModalDamping):
+        return np.diag(2 * damping.of(modes.count) * modes.omega)
+    if isinstance(damping, RayleighDamping):
+        return np.diag(damping.alpha + damping.beta * modes.omega**2)
+    projected = modes.shapes.T @ (damping @ modes.shapes)
     return (projected + projected.T) / 2

@@ -16,7 +16,7 @@ from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.level_modes import level_modes
 from multiphi_exudyn.levels.modal_base import INTERLACING, ModalBase
 from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
-from multiphi_exudyn.mathematics.eigenproblems.modes import turned
+from multiphi_exudyn.mathematics.eigenproblems.modes import aligned_modes
 from multiphi_exudyn.mathematics.eigenproblems.orthonormal import least_squares, orthonormal
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 
@@ -24,26 +24,28 @@ __all__ = ["build_level", "independent"]
 
 UNDAMPED = 1e-12  # of the largest damping: round-off of projecting it
 NEUTRAL = 1e-12  # of mu: an |omega^2| below it is round-off of zero
-ALMOST = 0.99  # of a direction's square: one of which others have less does not follow from them
+ALMOST = 0.99  # of a direction's square: with a smaller part in the span of others it is independent of them
 
 
 def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = None) -> Level:
-    """The level with these contacts closed, with its lowest ``modes`` modes at least, None for all that it has."""
+    """Return the level with these contacts closed and at least its lowest ``modes`` modes, all of them for None."""
     closed = list(indices)
     closed_directions = base.closed_at(indices)
     following = _following(base, [i for i in closed if base.links[i].rigid])
-    turned, _ = closed_directions.orthogonal
-    squares, vectors, accuracy = level_modes(base, turned, modes)
-    rigid_body = _rigid_body_modes(base, turned)
+    orthogonal, _ = closed_directions.orthogonal
+    squares, vectors, accuracy = level_modes(base, orthogonal, modes)
+    rigid_body = _rigid_body_modes(base, orthogonal)
     if rigid_body:
         squares[np.argsort(np.abs(squares), kind="stable")[:rigid_body]] = 0.0
     if accuracy:
         squares[np.abs(squares) <= NEUTRAL * accuracy] = 0.0
-    squares, vectors, seen = _turned(base, squares, vectors, closed)
+    squares, vectors, row_values = _aligned(base, squares, vectors, closed)
     _check_interlacing(base, squares, closed_directions, accuracy)
-    gap_rows = drop_round_off(seen[: len(base.links)], base.lengths[:, None])  # of a mode all components have some
+    gap_rows = drop_round_off(
+        row_values[: len(base.links)], base.lengths[:, None]
+    )  # every component of a mode has some
     if following.any():
-        gap_rows[following] = 0.0  # by definition, whatever a soft mode leaves
+        gap_rows[following] = 0.0  # exactly, whatever round-off a soft mode leaves
     damped = base.damped(vectors, closed)
     forces, rates = _force_rows(base, closed, squares, vectors, damped, gap_rows[closed])
     zero = squares == 0
@@ -65,26 +67,28 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     )
 
 
-def _turned(
+def _aligned(
     base: ModalBase, squares: np.ndarray, vectors: np.ndarray, closed: Sequence[int]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Modes of a level with signs and clusters chosen by contacts, then points, then the base's own modes.
+    """Return omega^2 and modes of a level, and the displacements (k, r) of contacts and points in each mode.
 
-    And what contacts and points see of them. Of zero-frequency modes those that nothing damps come first: they drift
-    for ever, the others come to rest.
+    Signs, and the modes within a cluster of one frequency, are chosen by contacts, then points, then the modes of the
+    base. Undamped zero-frequency modes come first: they drift for ever, damped ones come to rest.
     """
-    rows, sizes = base.seen
+    rows, sizes = base.observed_rows
     if squares.all():
-        return turned(squares, vectors, rows, sizes)
+        return aligned_modes(squares, vectors, rows, sizes)
     free = np.flatnonzero(squares == 0)
-    squares, vectors, seen = squares.copy(), vectors.copy(), np.empty((len(rows), len(squares)))
-    resisted, rotation = np.linalg.eigh(vectors[:, free].T @ base.damped(vectors[:, free], closed))
-    drifting = int(np.sum(resisted <= UNDAMPED * base.largest_damping(closed)))
+    squares, vectors, row_values = squares.copy(), vectors.copy(), np.empty((len(rows), len(squares)))
+    rates, rotation = np.linalg.eigh(vectors[:, free].T @ base.damped(vectors[:, free], closed))
+    drifting = int(np.sum(rates <= UNDAMPED * base.largest_damping(closed)))
     if 0 < drifting < len(free):
         vectors[:, free] = vectors[:, free] @ rotation
     for part in (free[:drifting], free[drifting:], np.flatnonzero(squares)):
-        squares[part], vectors[:, part], seen[:, part] = turned(squares[part], vectors[:, part], rows, sizes)
-    return squares, vectors, seen
+        squares[part], vectors[:, part], row_values[:, part] = aligned_modes(
+            squares[part], vectors[:, part], rows, sizes
+        )
+    return squares, vectors, row_values
 
 
 def _force_rows(
@@ -95,7 +99,10 @@ def _force_rows(
     damped: np.ndarray,
     gap_rows: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Contact forces of the closed contacts from eta and eta', (k, r) each; gap_rows (k, r): theirs."""
+    """Return the rows (k, r) that give the forces of closed contacts from eta, and those from eta'.
+
+    gap_rows: (k, r) of the closed contacts.
+    """
     rigid = [base.links[i].rigid for i in closed]
     forces, rates = base.restoring[:, closed, None] * gap_rows
     if any(rigid):
@@ -109,9 +116,9 @@ def _force_rows(
 def _projected_damping(
     base: ModalBase, closed: Sequence[int], free: np.ndarray, vectors: np.ndarray, damped: np.ndarray
 ) -> np.ndarray:
-    """D (r, r); on a zero-frequency mode round-off of no damping would be a damping of its own.
+    """Return the modal damping matrix D (r, r), with zeros in place of round-off on zero-frequency modes.
 
-    free: (r,) whether its frequency is zero. damped: C_l Phi_l.
+    Round-off would damp a mode that has no other damping. free: (r,) bool, zero frequency. damped: C_l Phi_l.
     """
     projected: np.ndarray = vectors.T @ damped
     if not free.any():
@@ -122,38 +129,38 @@ def _projected_damping(
 
 
 def independent(base: ModalBase, rigid: Sequence[int]) -> bool:
-    """Whether none of these rigid contacts follows from the others, so that they can be closed together."""
-    return not len(rigid) or _told_apart(base, orthonormal(base.units[:, list(rigid)])[1])
+    """Return whether the directions of these rigid contacts are linearly independent: they can be closed together."""
+    return not len(rigid) or _has_full_rank(base, orthonormal(base.units[:, list(rigid)])[1])
 
 
-def _told_apart(base: ModalBase, triangle: np.ndarray) -> bool:
-    """Whether directions of length one are independent; triangle: R (k, k) of them."""
-    left = np.abs(np.diagonal(triangle))
-    return triangle.shape[1] <= base.modes.count and bool(np.min(left) > INDEPENDENT)
+def _has_full_rank(base: ModalBase, triangle: np.ndarray) -> bool:
+    """Return whether unit directions are linearly independent; triangle: R (k, k) of their QR decomposition."""
+    remainders = np.abs(np.diagonal(triangle))
+    return triangle.shape[1] <= base.modes.count and bool(np.min(remainders) > INDEPENDENT)
 
 
-def _following(base: ModalBase, held: Sequence[int]) -> np.ndarray:
-    """Which contacts (c,) follow from these rigid ones, which are independent: their gaps do not move."""
+def _following(base: ModalBase, rigid: Sequence[int]) -> np.ndarray:
+    """Return for every contact (c,) whether these independent rigid contacts keep its gap constant."""
     units = base.units
-    if not len(held):
+    if not len(rigid):
         return base.lengths == 0
-    q, triangle = orthonormal(units[:, list(held)])
-    if not _told_apart(base, triangle):
-        names = ", ".join(base.links[i].name for i in held)
+    q, triangle = orthonormal(units[:, list(rigid)])
+    if not _has_full_rank(base, triangle):
+        names = ", ".join(base.links[i].name for i in rigid)
         raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
-    along = q.T @ units
-    almost = (along * along).sum(axis=0) > ALMOST
-    almost[list(held)] = False  # of themselves nothing is left
+    components = q.T @ units
+    almost = (components * components).sum(axis=0) > ALMOST
+    almost[list(rigid)] = False  # no remainder beside themselves
     following = base.lengths == 0
-    following[list(held)] = True
+    following[list(rigid)] = True
     if almost.any():
-        left = units[:, almost] - q @ along[:, almost]
-        following[almost] |= np.linalg.norm(left, axis=0) <= INDEPENDENT
+        remainders = units[:, almost] - q @ components[:, almost]
+        following[almost] |= np.linalg.norm(remainders, axis=0) <= INDEPENDENT
     return following
 
 
 def _rigid_body_modes(base: ModalBase, closed_directions: ClosedDirections) -> int:
-    """Rigid-body motions that no closed contact resists."""
+    """Return the number of rigid-body motions that no closed contact resists."""
     if base.modes.rigid == 0:
         return 0
     rigid = closed_directions.resisting[: base.modes.rigid]
@@ -166,7 +173,7 @@ def _rigid_body_modes(base: ModalBase, closed_directions: ClosedDirections) -> i
 def _reaction_rows(
     base: ModalBase, pinned: np.ndarray, squares: np.ndarray, vectors: np.ndarray, spring_forces: np.ndarray
 ) -> np.ndarray:
-    """Reaction of every mode: (Omega^2 - omega^2) psi - (force of the springs) = H_r rho, solved for rho (c, r).
+    """Return the reactions (c, r) of every mode: (Omega^2 - omega^2) psi - (force of the springs) = H_r rho.
 
     Weighted by 1 / (Omega^2 + |omega^2|), in which no mode of the base outweighs the others.
     """
@@ -180,14 +187,14 @@ def _reaction_rows(
         return np.asarray((residuals / total @ along) / (along * along / total).sum(axis=1))[None, :]
     roots = 1 / np.sqrt(total)
     q, r = np.linalg.qr(roots[:, :, None] * pinned)
-    given = np.einsum("ijk,ij->ik", q, roots * residuals)
-    return np.asarray(np.linalg.solve(r, given[:, :, None])[:, :, 0].T)
+    projected = np.einsum("ijk,ij->ik", q, roots * residuals)
+    return np.asarray(np.linalg.solve(r, projected[:, :, None])[:, :, 0].T)
 
 
 def _check_interlacing(
     base: ModalBase, squares: np.ndarray, closed_directions: ClosedDirections, accuracy: float
 ) -> None:
-    """Refuse omega^2 (r,) that the theorem in the module's docstring forbids."""
+    """Raise NumericalFailure for omega^2 (r,) that violate the interlacing theorem of the module's docstring."""
     stiffness, slack = closed_directions.stiffness.tolist(), INTERLACING * accuracy
     stiffening, softening = sum(k > 0 for k in stiffness), sum(k < 0 for k in stiffness)
     below, above = base.square_bounds

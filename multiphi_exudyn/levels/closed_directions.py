@@ -1,4 +1,4 @@
-"""Closed directions: what closed contacts are along each of their directions.
+"""Closed directions: the springs and rigid constraints that closed contacts make, one for each direction.
 
 Closed springs of one direction p, the chain of a force law or compliant contacts at one place, are one spring
 K q + G, q = p.y; beside a closed rigid contact of that direction they are a constant force.
@@ -16,9 +16,9 @@ __all__ = ["ClosedDirections"]
 
 @dataclass(frozen=True)
 class ClosedDirections:
-    """What closed contacts are along each of their d directions p.
+    """One spring or rigid constraint for each of the d directions p of closed contacts.
 
-    members: the contacts of each. vectors: p (m, d). stiffness: K (d,) [N/m], inf where rigid.
+    members: the contacts of each direction. vectors: p (m, d). stiffness: K (d,) [N/m], inf where rigid.
     offsets: (d,) G / K [m], the gap of a single contact; G [N] where K is zero.
     """
 
@@ -29,25 +29,27 @@ class ClosedDirections:
 
     @property
     def rigid(self) -> np.ndarray:
-        """(d,) bool."""
+        """Whether each direction (d,) is rigid."""
         return np.isinf(self.stiffness)
 
     @property
     def orthogonal(self) -> tuple[ClosedDirections, np.ndarray]:
-        """The same with the directions of rigid contacts orthogonal to each other, Q, and R (k, k): they are Q R.
+        """The same with orthogonal directions Q of the rigid contacts, and R (k, k): their directions are Q R.
 
-        Nearly parallel ones would leave the difference of their small difference to round-off. Q keeps their unit.
+        The small difference of nearly parallel directions would be lost in round-off. Q has their unit of length.
         """
         count = int(np.count_nonzero(self.rigid))
-        return (self, np.eye(count)) if count < 2 else self._turned  # not kept: what keeps itself is let go late
+        return (
+            (self, np.eye(count)) if count < 2 else self._orthogonalised
+        )  # no reference to itself, which would delay its release
 
     @functools.cached_property
-    def _turned(self) -> tuple[ClosedDirections, np.ndarray]:
-        """``orthogonal`` where there is something to turn."""
+    def _orthogonalised(self) -> tuple[ClosedDirections, np.ndarray]:
+        """``orthogonal`` for two or more rigid directions."""
         rigid = self.rigid
-        own = self.vectors[:, rigid]
-        length = float(np.max(np.linalg.norm(own, axis=0))) or 1.0
-        q, r = np.linalg.qr(own / length)
+        directions = self.vectors[:, rigid]
+        length = float(np.max(np.linalg.norm(directions, axis=0))) or 1.0
+        q, r = np.linalg.qr(directions / length)
         vectors, offsets = self.vectors.copy(), self.offsets.copy()
         vectors[:, rigid] = length * q
         offsets[rigid] = np.linalg.solve(r.T, offsets[rigid])
@@ -55,12 +57,12 @@ class ClosedDirections:
 
     @property
     def resisting(self) -> np.ndarray:
-        """Directions (m, .) in which there is a stiffness."""
+        """Directions (m, .) with a stiffness that is not zero."""
         return self.vectors[:, self.stiffness != 0]
 
     @property
     def size(self) -> float:
-        """The largest norm of these."""
+        """Largest norm of the resisting directions."""
         return float(np.linalg.norm(self.resisting, axis=0).max(initial=0.0))
 
     @property

@@ -3,10 +3,10 @@
     x = Phi_l eta + x_inf,l                                                           (38.4)
     eta'' + Phi_l^T C Phi_l eta' + diag(omega_l^2) eta = Phi_l^T (f - f_static)       (38.3)
 
-The asymptotic configuration x_inf,l holds gaps and static loads (static_response.py). Where no closed contact resists a
-rigid-body motion, the load on it drives the level's zero-frequency modes. The total stiffness of a force law may be
-negative, and
-the level indefinite: then omega^2 < 0, the square of a rate of growth (eta ~ exp(+-|omega| t)).
+The asymptotic configuration x_inf,l is the static response to gaps and static loads (static_response.py). Where no
+closed contact resists a rigid-body motion, the load along it accelerates the level's zero-frequency modes. The total
+stiffness of a force law may be negative, and the level indefinite: then omega^2 < 0, the square of a rate of growth
+(eta ~ exp(+-|omega| t)).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.level_override import LevelOverride
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.mode_figure import mode_figure
-from multiphi_exudyn.levels.static_response import Asymptotic, neutral_response, static_response
+from multiphi_exudyn.levels.static_response import Asymptotic, response_of_neutral_level, static_response
 from multiphi_exudyn.mathematics.eigenproblems.modes import NEAR
 from multiphi_exudyn.mathematics.response.coupled_response import modal_response
 from multiphi_exudyn.mathematics.response.free_response import ModalResponse, is_slow
@@ -46,16 +46,16 @@ class Level(Shown):
         x = Phi_l eta + x_inf,l                                                           (38.4)
         eta'' + Phi_l^T C Phi_l eta' + diag(omega_l^2) eta = Phi_l^T (f - f_static)       (38.3)
 
-    Made by ``MultiPhiModel.level``. The arrays are in base coordinates (m,), which all levels of a model share; what is
-    of the structure (``shapes``, ``asymptotic_configuration``) has n rows. Springs of a force law may be negative: then
-    some omega^2 < 0, the square of a rate of growth, eta ~ exp(+-|omega| t).
+    Made by ``MultiPhiModel.level``. The arrays are in base coordinates (m,), which all levels of a model share;
+    ``shapes`` and ``asymptotic_configuration`` are in structural coordinates (n,). Springs of a force law may be
+    negative: then some omega^2 < 0, the square of a rate of growth, eta ~ exp(+-|omega| t).
 
     Attributes
     ----------
     closed : tuple of str
         Names of its closed contacts; of a force law, of the links that its segment has beside those of segment "0".
     indices : tuple of int
-        Positions in the base of all links that hold.
+        Positions in the base of all active links.
     base : ModalBase
         The coordinates that all levels share.
     squares : array (r,)
@@ -67,17 +67,17 @@ class Level(Shown):
     gap_rows : array (c, r)
         gap_i = gap_rows[i].eta + ... for every contact of the model.
     following : array (c,)
-        Whether the closed rigid contacts alone determine a contact's gap; of other contacts loads move it as well.
+        Whether the closed rigid contacts alone determine a contact's gap, so that loads do not change it.
     speed_rows : array (c, r)
-        gap_i' = speed_rows[i].eta', as impacts see it: without the quasi-static part of what varies (events/channels).
+        gap_i' = speed_rows[i].eta' for impacts, without the quasi-static part of varying loads (events/channels).
     force_rows, force_rate_rows : array (k, r)
-        Contact forces of the closed contacts from eta and eta'.
+        They give the forces of the closed contacts from eta and eta'.
     neutral : array (m, z)
-        The zero-frequency modes if negative springs have cancelled the stiffness of one, else z = 0.
+        The zero-frequency modes if negative springs cancel the stiffness of a mode, else z = 0.
     computed : array (r,)
-        omega^2 [rad2/s2] of M and K themselves; ``squares`` differ where they are overridden.
+        omega^2 [rad2/s2] computed from M and K; ``squares`` differ where they are overridden.
     kept_beyond : int
-        Number of modes beyond those asked for, kept so that no cluster of modes of one frequency is cut.
+        Number of modes beyond the requested ones, kept so that no cluster of modes of one frequency is cut.
 
     Examples
     --------
@@ -131,7 +131,7 @@ class Level(Shown):
 
     @functools.cached_property
     def highest_frequency(self) -> float:
-        """The highest of them [Hz], zero where there is none."""
+        """Highest natural frequency [Hz], zero without modes."""
         return math.sqrt(self.squares.max(initial=0.0)) / (2 * math.pi)
 
     @property
@@ -142,45 +142,45 @@ class Level(Shown):
 
     @property
     def coupling(self) -> np.ndarray:
-        """What the motion's stiffness (r, r) [rad2/s2] has beside diag(omega^2): where contacts slide."""
+        """Coupling (r, r) [rad2/s2] that is added to diag(omega^2), zero unless contacts slide."""
         return np.zeros((self.modes, self.modes))
 
     @property
     def damping_matrix(self) -> np.ndarray:
-        """Of the motion (r, r) [1/s]: D, but where contacts slide."""
+        """Damping matrix (r, r) [1/s] of the motion, which is D unless contacts slide."""
         return self.damping
 
     @functools.cached_property
     def static_shares(self) -> dict[str, float]:
-        """For every closed compliant contact, the part of its flexibility h.K_l^-1 h that the kept modes leave out.
+        """For every closed compliant contact, the part of its flexibility h.K_l^-1 h that the truncated modes have.
 
-        rho = left / (left + sum |h.psi / omega|^2 over kept modes), 0 to 1, by name; for a force law by the law's name.
-        No gap moves beside a closed rigid contact of the same direction: there is none of those.
+        rho = truncated / (truncated + sum |h.psi / omega|^2 over kept modes), 0 to 1, by name; for a force law by the
+        law's name. A contact beside a closed rigid contact of the same direction cannot move and is not listed.
         """
         base = self.base
         closed_directions, _ = base.closed_at(self.indices).orthogonal
         springs, flexibilities = np.flatnonzero(~closed_directions.rigid), self._flexibilities(closed_directions)
         names = [base.label(closed_directions.members[s][0]) for s in springs.tolist()]
         rows = closed_directions.vectors[:, springs].T
-        own = np.sum((rows * base.periods) ** 2, axis=1)
+        open_flexibility = np.sum((rows * base.periods) ** 2, axis=1)
         kept = (rows @ self.vectors) ** 2 / np.where(self.computed == 0, np.inf, self.computed)
-        left = np.maximum(flexibilities[springs] - np.sum(kept, axis=1), 0.0)
-        whole = left + np.sum(np.abs(kept), axis=1)
-        moving = whole > ZERO * own  # what rigid contacts leave of the others is round-off
-        shares = np.divide(left, whole, out=np.zeros(len(left)), where=moving)
+        truncated = np.maximum(flexibilities[springs] - np.sum(kept, axis=1), 0.0)
+        whole = truncated + np.sum(np.abs(kept), axis=1)
+        moving = whole > ZERO * open_flexibility  # else rigid contacts hold the gap, but for round-off
+        shares = np.divide(truncated, whole, out=np.zeros(len(truncated)), where=moving)
         return dict(zip(names, shares.tolist(), strict=True))
 
     def _flexibilities(self, closed_directions: ClosedDirections) -> np.ndarray:
-        """p.K_l^-1 p (d,) along springs, (1/K) (1/K + F)^-1 F with F = P^T Omega^-2 P, P all closed contacts'."""
+        """Return p.K_l^-1 p (d,) along springs: (1/K) (1/K + F)^-1 F, F = P^T Omega^-2 P, P of all closed contacts."""
         stiffness, vectors = closed_directions.stiffness, closed_directions.vectors
         if self.base.modes.rigid or np.any(stiffness == 0):
             gaps = np.zeros(len(self.indices))
             return np.array([row @ self.static_response(row, gaps)[1] for row in vectors.T])
         free = vectors.T @ (self.base.compliance[:, None] * vectors)
-        yielding = 1 / stiffness
-        if len(yielding) == 1:
-            return np.asarray(yielding * free[0] / (free[0] + yielding))
-        return np.asarray(yielding * np.diagonal(np.linalg.solve(free + np.diag(yielding), free)))
+        compliances = 1 / stiffness
+        if len(compliances) == 1:
+            return np.asarray(compliances * free[0] / (free[0] + compliances))
+        return np.asarray(compliances * np.diagonal(np.linalg.solve(free + np.diag(compliances), free)))
 
     @functools.cached_property
     def shapes(self) -> np.ndarray:
@@ -195,25 +195,25 @@ class Level(Shown):
 
     @functools.cached_property
     def response(self) -> ModalResponse:
-        """Closed form of the level's motion, however long."""
+        """Closed form of the level's motion, of any duration."""
         return modal_response(self.squares, self.damping_matrix, self.coupling)
 
-    def response_within(self, lasting: float) -> ModalResponse:
-        """Closed form of motions that last so long [s] at most: zero-frequency modes may be damped slowly beside it."""
+    def response_within(self, duration: float) -> ModalResponse:
+        """Return the closed form of motions of at most ``duration`` [s], also with slowly damped rigid-body modes."""
         rates = self.response.basis.rates
-        if self.squares.all() or not np.any((rates != 0) & is_slow(rates, lasting)):
+        if self.squares.all() or not np.any((rates != 0) & is_slow(rates, duration)):
             return self.response
-        return modal_response(self.squares, self.damping_matrix, self.coupling, lasting)
+        return modal_response(self.squares, self.damping_matrix, self.coupling, duration)
 
     def apart(self, modes: int) -> int | None:
-        """Least number of modes >= ``modes`` after which another frequency follows; None where that is not built."""
+        """Return the least number of modes >= ``modes`` that cut no cluster of one frequency, None if not built."""
         squares = self.squares[modes - 1 :].tolist()
         steps = enumerate(itertools.pairwise(squares), start=modes)
-        return next((count for count, (last, other) in steps if other - last > NEAR * abs(other)), None)
+        return next((count for count, (lower, upper) in steps if upper - lower > NEAR * abs(upper)), None)
 
-    def truncated(self, asked: int) -> Level:
-        """The same level with its lowest ``asked`` modes, and those that ``apart`` adds."""
-        modes = self.apart(asked) or self.modes
+    def truncated(self, count: int) -> Level:
+        """Return the same level with its lowest ``count`` modes, and those that complete a cluster (``apart``)."""
+        modes = self.apart(count) or self.modes
         return Level(
             closed=self.closed,
             indices=self.indices,
@@ -228,15 +228,15 @@ class Level(Shown):
             force_rate_rows=self.force_rate_rows[:, :modes],
             neutral=self.neutral,
             computed=self.computed[:modes],
-            kept_beyond=modes - asked,
+            kept_beyond=modes - count,
         )
 
     def overridden(self, override: LevelOverride) -> Level:
-        """The same mode shapes with given frequencies and ratios."""
+        """Return the level with the same mode shapes and the frequencies and damping ratios of an override."""
         squares, damping = self.squares.copy(), self.damping.copy()
         if override.frequencies is not None:
-            given = 2 * math.pi * np.asarray(override.frequencies, dtype=float)[: self.modes]
-            squares[: len(given)] = given**2
+            omega = 2 * math.pi * np.asarray(override.frequencies, dtype=float)[: self.modes]
+            squares[: len(omega)] = omega**2
         if override.ratios is not None:
             ratios = np.asarray(override.ratios, dtype=float)[: self.modes]
             damping[: len(ratios), :] = damping[:, : len(ratios)] = 0.0
@@ -245,16 +245,16 @@ class Level(Shown):
         return replace(self, squares=squares, damping=damping)
 
     def plot_modes(self, count: int = 6, rows: np.ndarray | None = None, positions: np.ndarray | None = None) -> Figure:
-        """A matplotlib figure of the lowest mode shapes, each scaled to 1.
+        """Return a matplotlib figure of the lowest mode shapes, each scaled to 1.
 
         Parameters
         ----------
         count : int, default 6
-            How many are drawn.
+            Number of modes to draw.
         rows : array (k, n), default None
-            What is drawn of a shape, such as the deflections along a beam; None for every degree of freedom.
+            Rows that give the quantities to draw, such as deflections along a beam; None for all degrees of freedom.
         positions : array (k,), default None
-            Where [m] each of them stands; None for their numbers.
+            Position [m] of each quantity; None for its number.
 
         Raises
         ------
@@ -272,24 +272,26 @@ class Level(Shown):
         return mode_figure(shown @ self.shapes[:, :count], self.frequencies[:count], places, label)
 
     def asymptotic(self, load: np.ndarray) -> Asymptotic:
-        """State of rest under a static load (m,) in base coordinates, and the constant forces of force laws."""
+        """Return the static response to a load (m,) in base coordinates and to the constant forces of force laws."""
         base, index = self.base, list(self.indices)
         closed_directions = base.closed_at(self.indices)
-        along, configuration, pushing = self._response(closed_directions, load + base.preload)
+        along, configuration, unbalanced = self._response(closed_directions, load + base.preload)
         gaps = base.gaps_at(configuration, base.gaps)
         strain = base.strain(configuration, index, gaps)
         return Asymptotic(
             configuration=configuration,
             gaps=gaps,
             forces=base.contact_forces(closed_directions, along, gaps)[index],
-            drive=np.zeros(self.modes) if self.squares.all() else np.where(self.squares, 0.0, self.vectors.T @ pushing),
+            drive=np.zeros(self.modes)
+            if self.squares.all()
+            else np.where(self.squares, 0.0, self.vectors.T @ unbalanced),
             load=self.vectors.T @ load,
             strain=strain,
             potential=strain - float(load @ configuration),
         )
 
     def static_response(self, load: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Contact forces (k,) and configuration y (m,) at rest, from a load (m,) and the closed contacts' gaps (k,)."""
+        """Return contact forces (k,) and y (m,) in response to a static load (m,) and gaps (k,) of closed contacts."""
         base, index, initial = self.base, list(self.indices), np.zeros(len(self.base.links))
         initial[index] = gaps
         closed_directions = base.closed_directions(index, gaps)
@@ -300,9 +302,9 @@ class Level(Shown):
     def _response(
         self, closed_directions: ClosedDirections, total: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(f, y, what drives zero-frequency modes, if there are any) under a load (m,)."""
+        """Return (f, y, force on zero-frequency modes) of the static response to a load (m,)."""
         if self.neutral.size:
-            return neutral_response(self.base, closed_directions, self.neutral, total, self.closed)
+            return response_of_neutral_level(self.base, closed_directions, self.neutral, total, self.closed)
         along, configuration = static_response(self.base, closed_directions, total)
         if self.squares.all():
             return along, configuration, total

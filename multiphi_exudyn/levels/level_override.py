@@ -15,9 +15,9 @@ __all__ = ["LevelOverride"]
 class LevelOverride:
     """Frequencies and damping ratios that replace the computed ones of a level's lowest modes.
 
-    The paper's own way of giving measured modal data per level. What is overridden is no longer one physical (M, C, K):
-    such a level does not interlace, and a transition into it need not lower the energy. Mode shapes and static
-    deflections stay the computed ones, also those that a slowly varying load goes through.
+    Measured modal data for a level, as in the paper. An overridden level does not follow from one physical (M, C, K):
+    its frequencies need not interlace with those of other levels, and a transition into it may raise the energy. Mode
+    shapes and static deflections stay the computed ones, also the quasi-static ones under slowly varying loads.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class LevelOverride:
     Raises
     ------
     MultiPhiTypeError
-        For what are no real numbers.
+        For values that are no real numbers.
     MultiPhiValueError
         For an array of numbers that is no list.
 
@@ -50,8 +50,8 @@ class LevelOverride:
 
     def __post_init__(self) -> None:
         for name in ("frequencies", "ratios"):
-            if (given := getattr(self, name)) is not None:
-                values = real_array(f"level override {name}", given, "a list of numbers")
+            if (numbers := getattr(self, name)) is not None:
+                values = real_array(f"level override {name}", numbers, "a list of numbers")
                 if values.ndim != 1:
                     raise MultiPhiValueError(f"level override {name}: got shape {values.shape}, need a list of numbers")
                 object.__setattr__(self, name, tuple(values.tolist()))

@@ -13,23 +13,22 @@ from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.mode_choice import FIRST
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mathematics.eigenproblems.lowest_modes import left_out
+from multiphi_exudyn.mathematics.eigenproblems.lowest_modes import missing_flexibility
 from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["LevelStore"]
 
-CACHE_BYTES = 2**30  # that the levels of a model may take, with what is kept beside them: 1 GiB leaves room on a laptop
-FEWEST_LEVELS = 8  # kept whatever they take: a run that goes to and fro between a few would build them at every event
+CACHE_BYTES = 2**30  # of the cached levels of a model, with their data: 1 GiB, which leaves room on a laptop
+FEWEST_LEVELS = 8  # cached whatever their size: a run that alternates between them would else rebuild them
 
 
 class LevelStore:
-    """Base and levels of a structure with contacts, built when they are asked for.
+    """Base and levels of a structure with contacts, built on first use.
 
-    first: modes that an incomplete base is built for where no number is given. chosen: the number chosen then, None
-    before. base: None before it is built. further: rows (k, n) of loads that the base is to hold. narrow: the model of
-    which this store's is the same with those rows. earlier: a store whose modes and rows are taken over, if it is of
-    the same structure.
+    first: number of modes for which an incomplete base is built if no number is given. chosen: the number chosen then,
+    None before. base: None before it is built. load_rows: rows (k, n) of loads for the base. narrow: the model without
+    these rows. earlier: a store whose modes and rows are reused, if it is of the same structure.
     """
 
     def __init__(
@@ -38,52 +37,56 @@ class LevelStore:
         self.structure, self.contacts = structure, contacts
         self.first, self.chosen = FIRST, None  # type: int, int | None
         self.base: ModalBase | None = None
-        self.further: np.ndarray | None = None
+        self.load_rows: np.ndarray | None = None
         self.narrow: Any = None
-        self._less: ModalBase | None = None
+        self._previous_base: ModalBase | None = None
         self._levels: BoundedCache[tuple[int, ...], Level] | None = None
-        self._outside: dict[bytes, float] = {}
+        self._missing: dict[bytes, float] = {}
         if earlier is not None and earlier.structure is structure:
-            self.further, self.narrow, self._less = earlier.further, earlier.narrow, earlier.base or earlier._less
+            self.load_rows, self.narrow, self._previous_base = (
+                earlier.load_rows,
+                earlier.narrow,
+                earlier.base or earlier._previous_base,
+            )
 
-    def built(self, modes: int | None) -> ModalBase:
-        """The base, built for levels with so many modes at first use, None for all."""
+    def built_base(self, modes: int | None) -> ModalBase:
+        """Return the base, built on first use for levels with so many modes, None for all."""
         if self.base is None:
-            self.base = build_base(self.structure, self.contacts, modes or "all", self._less, self.further)
-            self._less = None
+            self.base = build_base(self.structure, self.contacts, modes or "all", self._previous_base, self.load_rows)
+            self._previous_base = None
         return self.base
 
     def serves(self, modes: int | None) -> bool:
-        """Whether levels with so many modes may be taken from the base, None for all."""
+        """Return whether the base is good for levels with so many modes, None for all."""
         base = self.base
-        return base is not None and (base.complete or (modes is not None and modes <= base.served))
+        return base is not None and (base.complete or (modes is not None and modes <= base.most_level_modes))
 
-    def most_kept(self, r: int) -> int:
-        """Number of levels with r modes that ``CACHE_BYTES`` hold, with what is kept beside them."""
-        assert self.base is not None, "levels are kept where there is a base"
-        of_a_mode = self.base.modes.count + 30 * r + 2 * len(self.base.links)
-        return max(FEWEST_LEVELS, CACHE_BYTES // (8 * r * of_a_mode))
+    def cache_capacity(self, r: int) -> int:
+        """Return the number of levels with r modes that fit into ``CACHE_BYTES``, with their data."""
+        assert self.base is not None, "levels need a base"
+        numbers_per_mode = self.base.modes.count + 30 * r + 2 * len(self.base.links)
+        return max(FEWEST_LEVELS, CACHE_BYTES // (8 * r * numbers_per_mode))
 
     def level(self, indices: tuple[int, ...], modes: int) -> Level:
-        """A level with its lowest so many modes at least, or all that it has."""
+        """Return a level with at least its lowest ``modes`` modes, or with all."""
         base, levels = self.base, self._levels
-        assert base is not None, "levels are built where there is a base"
+        assert base is not None, "levels need a base"
         if levels is None:
-            levels = self._levels = BoundedCache(self.most_kept(modes))
+            levels = self._levels = BoundedCache(self.cache_capacity(modes))
         most = base.modes.count - sum(base.links[i].rigid for i in indices)
-        needed, found, further = min(modes, most), levels.find(indices), 1
-        while found is None or (found.modes < most and (found.modes < needed or found.apart(needed) is None)):
-            wanted = needed + further
-            found = levels.keep(indices, build_level(base, indices, wanted if wanted < most else None))
-            further *= 2
-        return found
+        needed, level, extra = min(modes, most), levels.find(indices), 1
+        while level is None or (level.modes < most and (level.modes < needed or level.apart(needed) is None)):
+            requested = needed + extra
+            level = levels.keep(indices, build_level(base, indices, requested if requested < most else None))
+            extra *= 2
+        return level
 
     def outside(self, row: np.ndarray) -> float:
-        """Share of the static flexibility at a row (n,) that the base does not hold."""
+        """Return the share of the static flexibility at a row (n,) that the base does not represent."""
         base, key = self.base, row.tobytes()
         if base is None or base.complete:
             return 0.0
-        if key not in self._outside:
-            found = left_out(self.structure.mass, self.structure.stiffness, base.modes, row[None, :])
-            self._outside[key] = float(found[0])
-        return self._outside[key]
+        if key not in self._missing:
+            shares = missing_flexibility(self.structure.mass, self.structure.stiffness, base.modes, row[None, :])
+            self._missing[key] = float(shares[0])
+        return self._missing[key]

@@ -3,8 +3,8 @@
     x = Phi y,   y = Phi^T M x
 
 Phi (n, m) are the open structure's own modes, so the mass is the identity and the stiffness diag(Omega^2). They are all
-of them where that is affordable, else the lowest ones and, orthogonal to them, what Krylov vectors of contacts and
-points leave (build_base.py). A set of closed contacts then adds
+of them where that is affordable, else the lowest ones and, orthogonal to them, the remainders of
+Krylov vectors of contacts and points (build_base.py). A set of closed contacts then adds
 
     closed rigid contacts      H_r^T y = -gap
     closed compliant contacts  K_l = diag(Omega^2) + H_c diag(k) H_c^T,   C_l = C + H_c diag(c) H_c^T
@@ -33,7 +33,7 @@ __all__ = ["ModalBase", "parallel"]
 PARALLEL = 1e-14  # of the largest component: directions that differ by less differ by round-off
 INTERLACING = 1e-8  # relative violation of the interlacing theorem that is still round-off
 EPSILON = float(np.finfo(float).eps)
-CLOSED_SETS = 8  # of contacts, whose directions are kept: a level asks for them when it is built and when it is loaded
+CLOSED_SETS = 8  # of contacts, whose directions are cached: a level needs them when it is built and when it is loaded
 CANCELLED = 1e-13  # of sum |k|: a total stiffness of a force law below it is round-off of zero
 
 
@@ -44,8 +44,9 @@ class ModalBase(ElementTable, Shown):
     modes: of the open structure, (n, m). points: (k, m), rows of its points. damping: C (m, m). directions: H (m, l) of
     the l links; pushes: F (m, l), along which their forces act. contacts: elements (c,) as given, whose first links
     come first (element.py). complete: whether m = n. mass: M (n, n), the structure's own.
-    exact: how many of its modes, the lowest, are the structure's own. served: modes that levels may have at most.
-    further: rows (k, n) that it holds beside those of contacts and points. error: of omega^2 of sample levels.
+    exact_count: number of its lowest modes that are modes of the structure. most_level_modes: largest number of modes
+    of a level. load_rows: rows (k, n) of loads that the base represents beside those of contacts and points. error: of
+    omega^2 of sample levels, relative.
     """
 
     modes: Modes
@@ -56,9 +57,9 @@ class ModalBase(ElementTable, Shown):
     contacts: tuple[Element, ...]
     complete: bool
     mass: Matrix
-    exact: int
-    served: int
-    further: np.ndarray
+    exact_count: int
+    most_level_modes: int
+    load_rows: np.ndarray
     error: float
 
     def _facts(self) -> Iterator[tuple[str, str]]:
@@ -66,36 +67,36 @@ class ModalBase(ElementTable, Shown):
         yield "contacts", names([contact.name for contact in self.contacts])
 
     def coordinates(self, x: np.ndarray) -> np.ndarray:
-        """y = Phi^T M x (m,) or (m, k) of configurations (n,) or (n, k), zero where it is round-off.
+        """Return y = Phi^T M x (m,) or (m, k) of configurations (n,) or (n, k), with zeros in place of round-off.
 
-        Of a mode that alone moves a contact it would give one at rest a speed.
+        Round-off would give a contact at rest a speed.
         """
         if self.complete:
-            onto, sizes = self.projection
-            return drop_round_off(onto @ x, sizes @ np.abs(x))
+            projector, sizes = self.projection
+            return drop_round_off(projector @ x, sizes @ np.abs(x))
         shapes = self.modes.shapes.T
         return drop_round_off(shapes @ (self.mass @ x), np.abs(shapes) @ (abs(self.mass) @ np.abs(x)))
 
     @functools.cached_property
     def projection(self) -> tuple[np.ndarray, np.ndarray]:
-        """Phi^T M and |Phi|^T |M| (m, n), of a complete base: no larger than its modes."""
+        """Phi^T M and |Phi|^T |M| (m, n), of a complete base, where they are no larger than the modes."""
         shapes = self.modes.shapes
-        onto, sizes = (self.mass @ shapes).T, (abs(self.mass) @ np.abs(shapes)).T
-        return np.ascontiguousarray(onto), np.ascontiguousarray(sizes)
+        projector, sizes = (self.mass @ shapes).T, (abs(self.mass) @ np.abs(shapes)).T
+        return np.ascontiguousarray(projector), np.ascontiguousarray(sizes)
 
     def modal_load(self, load: np.ndarray) -> np.ndarray:
-        """Phi^T f (m,) of a load (n,), zero where it is round-off: a weight bends no body that falls freely."""
+        """Return Phi^T f (m,) of a load (n,), zero where it is round-off: weight bends no freely falling body."""
         shapes = self.modes.shapes.T
         return drop_round_off(shapes @ load, np.abs(shapes) @ np.abs(load))
 
     @functools.cached_property
     def magnitudes(self) -> tuple[np.ndarray, np.ndarray]:
-        """|H| (m, l) and |gaps| (l,): with them a gap's round-off is judged."""
+        """|H| (m, l) and |gaps| (l,): the sizes that bound the round-off of a gap."""
         return np.abs(self.directions), np.abs(self.gaps)
 
     @functools.cached_property
     def lengths(self) -> np.ndarray:
-        """|h| (l,) in these coordinates: with them the round-off of a mode's gap is judged."""
+        """|h| (l,) in these coordinates: the sizes that bound the round-off of a mode's gap."""
         return np.linalg.norm(self.directions, axis=0)
 
     @functools.cached_property
@@ -104,30 +105,30 @@ class ModalBase(ElementTable, Shown):
         return self.directions / np.where(self.lengths > 0, self.lengths, 1.0)
 
     @functools.cached_property
-    def seen(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows (k, m) of links and points, and what a mode of unit length can move them by, then the coordinates."""
+    def observed_rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows (k, m) of links and points, and their largest values (k + m,) at a unit mode, coordinates last."""
         rows = np.vstack([self.directions.T, self.points])
         return rows, np.concatenate([np.linalg.norm(rows, axis=1), np.ones(self.modes.count)])
 
     @functools.cached_property
     def direction_indices(self) -> list[int]:
-        """For every link itself, or the first one that has its direction up to its sign."""
+        """For every link the index of the first link with the same direction up to its sign."""
         return parallel(self.directions)
 
     @functools.cached_property
     def direction_signs(self) -> np.ndarray:
-        """Sign (c,) of every contact's direction to the one that stands for it."""
+        """Sign (c,) of every contact's direction relative to the first link with that direction (direction_indices)."""
         along = np.sum(self.directions * self.directions[:, self.direction_indices], axis=0)
         return np.where(along < 0, -1, 1)
 
     def pressing(self, element: int) -> dict[int, int]:
-        """The links of an element that have no held place, and the sign of their directions to its own."""
-        places = [k for k in self.link_indices[element] if not self.links[k].held]
-        return {k: int(self.direction_signs[k] * self.direction_signs[element]) for k in places}
+        """Return the links of an element without a held place, and the signs of their directions to its own."""
+        links = [k for k in self.link_indices[element] if not self.links[k].held]
+        return {k: int(self.direction_signs[k] * self.direction_signs[element]) for k in links}
 
     @functools.cached_property
     def preload(self) -> np.ndarray:
-        """Load (m,) of the constant forces of all force laws."""
+        """Modal load (m,) of the constant forces of all force laws."""
         total = np.zeros(self.modes.count)
         for i, law in self.laws.items():
             total -= law.constant * self.directions[:, i]
@@ -135,26 +136,26 @@ class ModalBase(ElementTable, Shown):
 
     @functools.cached_property
     def energy_offset(self) -> float:
-        """Strain energy [J] of the constant forces of all force laws at q = 0: a law has none at its centre."""
+        """Energy [J] of the constant forces of all force laws at q = 0: the energy of a law is zero at its centre."""
         return -sum(law.constant * law.centre for law in self.laws.values())
 
     def gaps_at(self, configuration: np.ndarray, initial: np.ndarray) -> np.ndarray:
-        """Gaps (l,) [m] at y (m,), from those at y = 0."""
+        """Return the gaps (l,) [m] at y (m,), from those at y = 0."""
         return np.asarray(self.directions.T @ configuration + initial)
 
     def strain(self, configuration: np.ndarray, closed: Sequence[int], gaps: np.ndarray) -> float:
-        """Strain energy [J] of y (m,), of the compliant ones among these closed contacts, and of constant forces.
+        """Return the energy [J] of the structure at y (m,), of closed compliant contacts, and of constant forces.
 
-        gaps: (l,) there.
+        gaps: (l,) at y.
         """
-        constant = float(self.squares.dot(configuration * configuration)) / 2 + self.energy_offset
+        energy = float(self.squares.dot(configuration * configuration)) / 2 + self.energy_offset
         if self.laws:
-            constant -= float(self.preload @ configuration)
+            energy -= float(self.preload @ configuration)
         if not len(closed):
-            return constant
+            return energy
         index = list(closed)
-        closing = gaps[index]
-        return constant + 0.5 * float(self.springs[index] @ (closing * closing))
+        closed_gaps = gaps[index]
+        return energy + 0.5 * float(self.springs[index] @ (closed_gaps * closed_gaps))
 
     @functools.cached_property
     def squares(self) -> np.ndarray:
@@ -163,7 +164,7 @@ class ModalBase(ElementTable, Shown):
 
     @functools.cached_property
     def square_bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Omega^2 (m,) less and more what of the interlacing theorem round-off may violate."""
+        """Omega^2 (m,) minus and plus the amount by which round-off may violate the interlacing theorem."""
         slack = INTERLACING * self.squares + EPSILON * self.squares.max(initial=0.0)
         return self.squares - slack, self.squares + slack
 
@@ -179,7 +180,7 @@ class ModalBase(ElementTable, Shown):
         return self.modes.omega[self.modes.rigid :] ** -2.0
 
     def damping_matrix(self, closed: Sequence[int]) -> np.ndarray:
-        """C_l (m, m) in these coordinates: the structure's damping and that of closed viscous contacts."""
+        """Return C_l (m, m) in these coordinates: damping of the structure and of closed viscous contacts."""
         viscous = [i for i in closed if self.dampings[i]]
         if not viscous:
             return self.damping
@@ -187,50 +188,50 @@ class ModalBase(ElementTable, Shown):
         return np.asarray(self.damping + (directions * self.dampings[viscous]) @ directions.T)
 
     def largest_damping(self, closed: Sequence[int]) -> float:
-        """The largest number in C_l: as C_l is positive semidefinite, it stands on the diagonal."""
-        own = np.diagonal(self.damping) + self.directions[:, closed] ** 2 @ self.dampings[closed]
-        return float(own.max(initial=0.0))
+        """Return the largest element of C_l, which is on the diagonal, as C_l is positive semidefinite."""
+        diagonal = np.diagonal(self.damping) + self.directions[:, closed] ** 2 @ self.dampings[closed]
+        return float(diagonal.max(initial=0.0))
 
     def damped(self, vectors: np.ndarray, closed: Sequence[int]) -> np.ndarray:
-        """C_l v (m, k) of vectors (m, k), without the matrix."""
-        own = self._own_damping
-        found = self.damping @ vectors if own is None else own[:, None] * vectors
+        """Return C_l v (m, k) for vectors v (m, k), without forming C_l."""
+        modal = self._modal_damping
+        product = self.damping @ vectors if modal is None else modal[:, None] * vectors
         viscous = [i for i in closed if self.dampings[i]]
         if viscous:
             directions = self.directions[:, viscous]
-            found += (directions * self.dampings[viscous]) @ (directions.T @ vectors)
-        return np.asarray(found)
+            product += (directions * self.dampings[viscous]) @ (directions.T @ vectors)
+        return np.asarray(product)
 
     @functools.cached_property
-    def _own_damping(self) -> np.ndarray | None:
-        """The structure's damping (m,) of every mode where it is modal, None where it couples them."""
-        own = np.diagonal(self.damping)
-        return own.copy() if np.count_nonzero(self.damping) == np.count_nonzero(own) else None
+    def _modal_damping(self) -> np.ndarray | None:
+        """Diagonal (m,) of the structure's damping matrix where it is diagonal, None where it couples modes."""
+        diagonal = np.diagonal(self.damping)
+        return diagonal.copy() if np.count_nonzero(self.damping) == np.count_nonzero(diagonal) else None
 
     def closed_at(self, closed: tuple[int, ...]) -> ClosedDirections:
-        """``closed_directions`` with the gaps that contacts have at y = 0; of the sets asked for last they are kept."""
-        return self._kept_closed.get_or_build(closed, lambda: self.closed_directions(closed, self.gaps[list(closed)]))
+        """Return ``closed_directions`` with the gaps at y = 0; those of the latest sets of contacts are cached."""
+        return self._closed_cache.get_or_build(closed, lambda: self.closed_directions(closed, self.gaps[list(closed)]))
 
     @functools.cached_property
-    def _kept_closed(self) -> BoundedCache[tuple[int, ...], ClosedDirections]:
+    def _closed_cache(self) -> BoundedCache[tuple[int, ...], ClosedDirections]:
         return BoundedCache(CLOSED_SETS)
 
     def closed_directions(self, closed: Sequence[int], gaps: np.ndarray) -> ClosedDirections:
-        """Closed contacts with their gaps (k,), those of one direction taken together, but two rigid ones never."""
-        along = [self.direction_indices[i] for i in closed]
-        if len(set(along)) == len(along):
-            index, alone = list(closed), tuple((i,) for i in closed)
+        """Return the directions of closed contacts with gaps (k,), parallel ones merged, but no two rigid ones."""
+        first_links = [self.direction_indices[i] for i in closed]
+        if len(set(first_links)) == len(first_links):
+            index, single = list(closed), tuple((i,) for i in closed)
             return ClosedDirections(
-                alone, self.directions[:, along], self.stiffnesses[index], self.direction_signs[index] * gaps
+                single, self.directions[:, first_links], self.stiffnesses[index], self.direction_signs[index] * gaps
             )
         groups: dict[int, list[int]] = {}
-        given = dict(zip(closed, gaps.tolist(), strict=True))
+        gap_of = dict(zip(closed, gaps.tolist(), strict=True))
         for i in closed:
             groups.setdefault(self.direction_indices[i], []).append(i)
-        together = [part for members in groups.values() for part in self._held_once(members)]
-        stiffness, offsets = np.zeros((2, len(together)))
-        for j, members in enumerate(together):
-            k, signed = self.stiffnesses[members], self.direction_signs[members] * [given[i] for i in members]
+        merged = [part for members in groups.values() for part in self._split_rigid(members)]
+        stiffness, offsets = np.zeros((2, len(merged)))
+        for j, members in enumerate(merged):
+            k, signed = self.stiffnesses[members], self.direction_signs[members] * [gap_of[i] for i in members]
             stiffness[j] = np.sum(k)
             rigid = np.isinf(k)
             if len(members) == 1 or np.any(rigid):
@@ -239,18 +240,18 @@ class ModalBase(ElementTable, Shown):
             if abs(stiffness[j]) <= CANCELLED * np.sum(np.abs(k)):
                 stiffness[j] = 0.0
             offsets[j] = np.sum(k * signed) / (stiffness[j] or 1.0)
-        directions = self.directions[:, [self.direction_indices[members[0]] for members in together]]
-        return ClosedDirections(tuple(map(tuple, together)), directions, stiffness, offsets)
+        directions = self.directions[:, [self.direction_indices[members[0]] for members in merged]]
+        return ClosedDirections(tuple(map(tuple, merged)), directions, stiffness, offsets)
 
-    def _held_once(self, members: list[int]) -> list[list[int]]:
-        """Contacts of one direction, every rigid one but the first on its own."""
+    def _split_rigid(self, members: list[int]) -> list[list[int]]:
+        """Return the groups of contacts of one direction: every rigid contact but the first is a group of its own."""
         further = [i for i in members if math.isinf(self.stiffnesses[i])][1:]
         return [[i for i in members if i not in further], *([i] for i in further)]
 
     def contact_forces(self, closed_directions: ClosedDirections, along: np.ndarray, gaps: np.ndarray) -> np.ndarray:
-        """lambda (l,) [N] from the forces (d,) along closed directions and the gaps (l,) there; zero where open.
+        """Return lambda (l,) [N] from forces (d,) along closed directions and gaps (l,); zero for open contacts.
 
-        Springs of one direction have what their gaps say, and a rigid contact among them the rest.
+        The forces of springs of one direction follow from their gaps; a rigid contact among them has the remainder.
         """
         forces = np.zeros(len(self.links))
         if all(len(members) == 1 for members in closed_directions.members):
@@ -258,24 +259,24 @@ class ModalBase(ElementTable, Shown):
             forces[index] = self.direction_signs[index] * along
             return forces
         for members, force in zip(closed_directions.members, along.tolist(), strict=True):
-            index, held = list(members), [i for i in members if math.isinf(self.stiffnesses[i])]
+            index, rigid = list(members), [i for i in members if math.isinf(self.stiffnesses[i])]
             if len(index) > 1:
-                springs = [i for i in index if i not in held]
-                moved = self.direction_signs[held[0]] * gaps[held[0]] if held else 0.0  # round-off of zero
-                forces[springs] = -self.stiffnesses[springs] * (gaps[springs] - self.direction_signs[springs] * moved)
+                springs = [i for i in index if i not in rigid]
+                offset = self.direction_signs[rigid[0]] * gaps[rigid[0]] if rigid else 0.0  # round-off of zero
+                forces[springs] = -self.stiffnesses[springs] * (gaps[springs] - self.direction_signs[springs] * offset)
                 force -= self.direction_signs[springs] @ forces[springs]
-                index = held
+                index = rigid
             forces[index] = self.direction_signs[index] * force
         return forces
 
 
 def parallel(directions: np.ndarray) -> list[int]:
-    """For every column of (m, l) itself, or the first one that is the same up to its sign."""
-    first, alone = list[int](), list[int]()
-    for i, one in enumerate(directions.T):
-        others = directions[:, alone]
-        apart = [np.max(np.abs(one[:, None] - sign * others), axis=0) for sign in (1, -1)]
-        same = np.flatnonzero(np.minimum(*apart) <= PARALLEL * np.max(np.abs(others), axis=0))
-        first.append(alone[same[0]] if len(same) else i)
-        alone += [] if len(same) else [i]
+    """Return for every column of (m, l) the index of the first column that is equal up to its sign."""
+    first, distinct = list[int](), list[int]()
+    for i, column in enumerate(directions.T):
+        others = directions[:, distinct]
+        distances = [np.max(np.abs(column[:, None] - sign * others), axis=0) for sign in (1, -1)]
+        same = np.flatnonzero(np.minimum(*distances) <= PARALLEL * np.max(np.abs(others), axis=0))
+        first.append(distinct[same[0]] if len(same) else i)
+        distinct += [] if len(same) else [i]
     return first

@@ -11,14 +11,14 @@ import numpy as np
 
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiTypeError
-from multiphi_exudyn.levels.equilibrium_under_forces import at_rest
+from multiphi_exudyn.levels.equilibrium_under_forces import equilibrium_under_forces
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.level_override import LevelOverride
 from multiphi_exudyn.levels.level_store import LevelStore
 from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo
 from multiphi_exudyn.levels.model_arguments import check_directions, check_modes, check_overrides, checked_contacts
 from multiphi_exudyn.levels.shared_base import SharedBase
-from multiphi_exudyn.levels.sliding import sliding
+from multiphi_exudyn.levels.sliding import with_sliding
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.element import Element
@@ -26,9 +26,9 @@ from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["MultiPhiModel"]
 
-WIDER = 2  # models with a base for other loads that a model keeps, each with n numbers for every coordinate
-ENTRIES = 64  # of what others have made of a model: sentences on its levels
-LOADS = 16  # keys of loads for which a model keeps what simulations have made of its levels; static ones have two
+WIDER = 2  # cached models with a base for other loads, each with n numbers for every coordinate
+ENTRIES = 64  # cached results that other modules derive from a model, such as sentences on its levels
+LOADS = 16  # cached sets of levels under loads, one for each key; static loads have two
 
 
 @dataclass(frozen=True, repr=False)
@@ -36,10 +36,10 @@ class MultiPhiModel(SharedBase, Shown):
     """Piecewise-linear modal model of a structure with contacts (the Multi-Phi method).
 
     With c contacts there are 2^c levels; every friction makes three times as many, every force law as many times as it
-    has segments. Only those that a run comes to are built, and kept up to 1 GiB, those used most recently. Levels are
+    has segments. Only those that a run enters are built; the most recently used are cached, up to 1 GiB. Levels are
     truncated from one larger base: ``dataclasses.replace(model, modes=12)`` builds nothing anew. Where a number of
     modes, or a cut-off, would part modes of one frequency, a level keeps all of them (``Level.kept_beyond``), and a run
-    says so.
+    warns.
 
     Parameters
     ----------
@@ -48,29 +48,29 @@ class MultiPhiModel(SharedBase, Shown):
     contacts : sequence of UnilateralContact, Friction and ForceLaw, default ()
         Any number, each with its own name.
     modes : int, "all", UpTo, Tolerance or None, default None
-        Number r of modes of every level, all that it has where they are fewer. ``UpTo``: those up to a frequency.
-        ``Tolerance``: the first run under ``simulate`` decides, once for this model. None: as many as hold the static
-        response of contacts and points, chosen without a run; all of them up to 30 degrees of freedom. ``most_modes``
-        tells the number.
+        Number r of modes of every level, all of them where there are fewer. ``UpTo``: those up to a frequency.
+        ``Tolerance``: the number is found by the first run under ``simulate``, once for this model. None: as many as
+        represent the static response of contacts and points, chosen without a run; all of them up to 30 degrees of
+        freedom. ``most_modes`` is the number.
     overrides : mapping of (name, ...) to LevelOverride, default empty
         Measured frequencies or ratios of single levels, by the names of their closed contacts.
     validity : callable, default None
-        From a trajectory of this model to sentences "kind: ..." on where the linear structure does not hold, none where
-        it does; ``simulate`` asks it at the end of a run. None: nothing is known.
+        Function of a trajectory of this model that returns sentences "kind: ..." on where the linear structure is not
+        valid, none where it is; ``simulate`` calls it at the end of a run. None: no check.
 
     Attributes
     ----------
     loaded : BoundedCache
-        Levels under loads, kept for later runs.
+        Levels under loads, cached for later runs.
     entries : BoundedCache
-        What others have made of it, by their keys.
+        Results that other modules derive from the model, by key.
 
     Raises
     ------
     MultiPhiTypeError
-        For arguments of another kind.
+        For arguments of another type.
     MultiPhiValueError
-        For modes < 1, two contacts of one name, a direction that is zero, and points or contacts that there are not.
+        For modes < 1, two contacts of one name, a zero direction, and unknown points or contacts.
 
     Examples
     --------
@@ -115,71 +115,72 @@ class MultiPhiModel(SharedBase, Shown):
             self, "overrides", {tuple(self.contacts[i].name for i in key): value for key, value in ordered.items()}
         )
         if not self._can_share():
-            self._begin_anew()
+            self._new_store()
 
     def push(self, states: Sequence[int]) -> np.ndarray:
-        """Load (m,) of the constant forces of elements in these states."""
-        pushes = [pushed[state] for pushed, state in zip(self.pushes_of_states, states, strict=True)]
+        """Return the load (m,) of the constant forces of elements in these states."""
+        pushes = [forces[state] for forces, state in zip(self.pushes_of_states, states, strict=True)]
         return np.asarray(self.base.directions[:, : len(pushes)] @ pushes)
 
     @property
     def decided(self) -> MultiPhiModel | None:
-        """Of a model with a Tolerance: the same with the modes that its first run has decided on, None before."""
+        """For a model with a Tolerance the model with the modes that its first run has found, None before."""
         return self._decisions[0] if self._decisions else None
 
     def decide(self, chosen: MultiPhiModel) -> None:
-        """Keep what the first run of a model with a Tolerance has decided on."""
+        """Store the model that the first run of a model with a Tolerance has found."""
         self._decisions[:] = [chosen]
 
     def holding(self, rows: np.ndarray) -> MultiPhiModel:
-        """The model whose base holds these rows (k, n) of loads too: itself, or one that it keeps for later runs."""
-        new = self.lacking(rows)
-        if not new:
+        """Return the model whose base also represents load rows (k, n): this one, or a cached wider one."""
+        missing = self.lacking(rows)
+        if not missing:
             return self
-        further = np.vstack([self.base.further, *new])
-        return self._wider.get_or_build(np.array(new).tobytes(), lambda: self._widened(further))
+        load_rows = np.vstack([self.base.load_rows, *missing])
+        return self._wider.get_or_build(np.array(missing).tobytes(), lambda: self._widened(load_rows))
 
-    def _widened(self, further: np.ndarray) -> MultiPhiModel:
-        """This model with a base that holds further rows (k, n)."""
+    def _widened(self, load_rows: np.ndarray) -> MultiPhiModel:
+        """Return this model with a base that also represents load rows (k, n)."""
         wider = replace(self)
-        store = wider._begin_anew()
-        store.further, store.first, store.narrow = further, self.base.served, self._shared.narrow or self
+        store = wider._new_store()
+        store.load_rows, store.first = load_rows, self.base.most_level_modes
+        store.narrow = self._shared_store.narrow or self
         return wider
 
     def widened_to(self, other: MultiPhiModel) -> bool:
-        """Whether another model is this one, but for rows of loads that its base holds."""
-        return other._shared.narrow is self
+        """Return whether another model is this one with a base for further loads."""
+        return other._shared_store.narrow is self
 
     @property
     def levels_built(self) -> int:
-        """Number of levels built so far, those built again included."""
+        """Number of levels built so far, including those built again."""
         return self._levels.kept
 
     @property
     def levels_kept(self) -> int:
-        """Number of levels that are kept."""
+        """Number of cached levels."""
         return len(self._levels)
 
     @property
     def highest_frequency(self) -> float:
-        """The highest frequency [Hz] of the levels that are kept."""
+        """Highest frequency [Hz] of the cached levels."""
         return max((level.highest_frequency for _, level in self._levels.items()), default=0.0)
 
     @functools.cached_property
     def most_levels(self) -> int:
-        """Number of levels that are kept: those of its size that a store holds."""
+        """Largest number of cached levels."""
         modes = self.most_modes or self.base.modes.count
         self._shared_base()
-        return self._shared.most_kept(modes)
+        return self._shared_store.cache_capacity(modes)
 
     @functools.cached_property
     def _levels(self) -> BoundedCache[tuple[int, ...], Level]:
         return BoundedCache(self.most_levels, self._forget)
 
     def _forget(self, indices: tuple[int, ...], level: Level) -> None:
-        """What is made of a level goes with it; a trajectory may still hold the level itself."""
-        for _, loaded in self.loaded.items():
-            loaded.forget(indices)
+        """Delete what is derived from a level; a trajectory may still refer to the level itself."""
+        for _, loaded_levels in self.loaded.items():
+            loaded_levels.forget(indices)
 
     def _facts(self) -> Iterator[tuple[str, str]]:
         yield "degrees of freedom", str(self.structure.n)
@@ -189,22 +190,22 @@ class MultiPhiModel(SharedBase, Shown):
         yield "levels built", f"{self.levels_built} of {self.levels_possible}"
 
     def level(self, closed: Iterable[str] | Mapping[str, str] = ()) -> Level:
-        """The level with these contacts closed, or with elements in these states, built on first use.
+        """Return the level with these contacts closed, or with elements in these states, built on first use.
 
         Parameters
         ----------
         closed : iterable of str, or mapping of str to str, default ()
             Names of the closed contacts, all others open, force laws in segment "0". Or {name: state}: "closed" of a
-            contact, "stick", "slip+" or "slip-" of friction, "idle" where it gives way and others stick for it, "+1",
-            "-1", ... of a force law; the others are in their first state, contacts open. States that differ by constant
-            forces alone have one level.
+            contact, "stick", "slip+" or "slip-" of friction, "idle" where it does not act and others stick in its
+            place, "+1", "-1", ... of a force law; the others are in their first state, contacts open. States that
+            differ by constant forces alone have one level.
 
         Raises
         ------
         MultiPhiTypeError
-            For what is neither.
+            For another type.
         MultiPhiValueError
-            For a name or a state that there is not.
+            For an unknown name or state.
         """
         if isinstance(closed, Mapping):
             return self.level_at(self.active_links(self.states_named(closed)))
@@ -213,45 +214,45 @@ class MultiPhiModel(SharedBase, Shown):
         return self.level_at(self.links_named(closed))
 
     def level_at(self, indices: tuple[int, ...]) -> Level:
-        """The level of closed contacts given by ascending positions."""
-        found = self._levels.find(indices)
-        if found is not None:
-            return found
-        level = self._full(indices)
-        level = level.truncated(self._modes_of(level))
+        """Return the level of closed contacts given by ascending positions."""
+        cached = self._levels.find(indices)
+        if cached is not None:
+            return cached
+        level = self._untruncated(indices)
+        level = level.truncated(self._mode_count(level))
         override = self.overrides.get(level.closed)
-        return self._levels.keep(indices, sliding(level if override is None else level.overridden(override)))
+        return self._levels.keep(indices, with_sliding(level if override is None else level.overridden(override)))
 
-    def _full(self, indices: tuple[int, ...]) -> Level:
-        """A level with at least the modes that this model needs; what other numbers of modes need is shared."""
+    def _untruncated(self, indices: tuple[int, ...]) -> Level:
+        """Return a level with at least the modes of this model, shared with models of other numbers of modes."""
         modes = self.most_modes or self.base.modes.count
         self._shared_base()
-        return self._shared.level(indices, modes)
+        return self._shared_store.level(indices, modes)
 
     def static_equilibrium(self, forces: Mapping[str, float], inertia_relief: bool = False) -> np.ndarray:
-        """Configuration x (n,) [m, rad] at rest under forces at points, with the right contacts closed.
+        """Return the equilibrium x (n,) [m, rad] under forces at points, with the contacts that close.
 
-        The configuration that the contacts admit nearest to the one without them, in the energy of structure and
-        contact springs. With force laws or friction it is the equilibrium that is reached when the forces are applied
-        slowly; a run that starts there with stretched springs of friction starts from ``equilibrium``.
+        With contacts alone it is the admissible configuration nearest to the one without contacts, in the energy of
+        structure and contact springs. With force laws or friction it is the equilibrium that is reached when the forces
+        are applied slowly; a run that starts there with stretched springs of friction starts from ``equilibrium``.
 
         Parameters
         ----------
         forces : mapping of str to float
             Point to force [N], along the point's positive displacement.
         inertia_relief : bool, default False
-            Of a structure with rigid-body modes: whether the forces may accelerate it. The answer is its deformation,
-            M-orthogonal to those modes, with False under forces that balance each other.
+            For a structure with rigid-body modes: whether the forces may accelerate it; with False they have to balance
+            each other. The result is its deformation, M-orthogonal to those modes.
 
         Raises
         ------
         MultiPhiTypeError
-            For what is no mapping.
+            For forces that are no mapping.
         MultiPhiValueError
-            For forces that a structure with rigid-body modes does not balance, or beside its force laws, friction or
-            contacts that close; rigid contacts that exclude each other, and points that there are not.
+            For a structure with rigid-body modes under unbalanced forces, with force laws or friction, or with contacts
+            that close; for rigid contacts that exclude each other, and for unknown points.
         NumericalFailure
-            Where the structure snaps through on the way, friction lets go with a jump, or contacts wedge.
+            Where the structure snaps through on the way, friction slips with a jump, or contacts wedge.
 
         Examples
         --------
@@ -268,29 +269,29 @@ class MultiPhiModel(SharedBase, Shown):
         return self.equilibrium(forces, inertia_relief).displacement
 
     def equilibrium(self, forces: Mapping[str, float], inertia_relief: bool = False) -> Equilibrium:
-        """``static_equilibrium`` with the stretches of friction's springs, as a start for ``simulate``.
+        """Return ``static_equilibrium`` with the stretches of friction springs, as a start for ``simulate``.
 
         The arguments and errors are those of ``static_equilibrium``.
         """
         base, load = self.base, self._force_row(forces)
         size = np.abs(base.modes.shapes.T) @ np.abs(load)
-        y, stretches = at_rest(base, base.modes.shapes.T @ load, size, inertia_relief)
-        named = {self.links[k].name: float(stretches[k]) for k in self.held}
-        return Equilibrium(base.modes.shapes @ y, named)
+        y, stretches = equilibrium_under_forces(base, base.modes.shapes.T @ load, size, inertia_relief)
+        stretch_of = {self.links[k].name: float(stretches[k]) for k in self.held}
+        return Equilibrium(base.modes.shapes @ y, stretch_of)
 
     def base_load(self, forces: Mapping[str, float]) -> np.ndarray:
-        """Forces [N] at points as a load (m,) in base coordinates."""
+        """Return forces [N] at points as a load (m,) in base coordinates."""
         return self.base.modes.shapes.T @ self._force_row(forces)
 
     def _force_row(self, forces: Mapping[str, float]) -> np.ndarray:
-        """Forces [N] at points as a load (n,)."""
+        """Return forces [N] at points as a load (n,)."""
         if not isinstance(forces, Mapping):
             raise MultiPhiTypeError(f"forces: got {type(forces).__name__}, need {{point: force in N}}")
         return self.structure.row(forces) if forces else np.zeros(self.structure.n)
 
-    def _modes_of(self, full: Level) -> int:
-        """Number of modes that are asked for of a level that has been built with all it may have."""
-        most = min(self.most_modes or full.modes, full.modes)
+    def _mode_count(self, level: Level) -> int:
+        """Return the number of modes to which a level is truncated in this model."""
+        most = min(self.most_modes or level.modes, level.modes)
         if not isinstance(self.modes, UpTo):
             return most
-        return min(max(1, int(np.searchsorted(full.frequencies, self.modes.frequency, side="right"))), most)
+        return min(max(1, int(np.searchsorted(level.frequencies, self.modes.frequency, side="right"))), most)

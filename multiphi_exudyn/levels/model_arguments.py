@@ -1,4 +1,4 @@
-"""What a model is made of, checked: contacts, their directions, the number of modes, and overrides."""
+"""Checks of the arguments of a model: contacts, their directions, the number of modes, and overrides."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["check_directions", "check_modes", "check_overrides", "checked_contac
 
 
 def checked_contacts(given: Any) -> tuple[Element, ...]:
-    """Contacts as they are given, each with a name of its own."""
+    """Return the contacts as a tuple; raise an error for other types and for names that occur twice."""
     needed = "UnilateralContact, Friction or ForceLaw"
     if not isinstance(given, Iterable):
         raise MultiPhiTypeError(f"contacts: got {type(given).__name__}, need a sequence of {needed}")
@@ -32,14 +32,14 @@ def checked_contacts(given: Any) -> tuple[Element, ...]:
 
 
 def check_directions(structure: LinearStructure, links: Iterable[AnyLink]) -> None:
-    """Refuse a link along no degree of freedom."""
+    """Raise an error for a link whose direction is zero."""
     for link in links:
         if not np.any(_row(structure, link)):
             raise MultiPhiValueError(f"contact {link.name!r} direction: got a zero row, need a direction")
 
 
 def _row(structure: LinearStructure, link: AnyLink) -> np.ndarray:
-    """The row (n,) of a link's direction; an error names the link."""
+    """Return the row (n,) of a link's direction; an error names the link."""
     try:
         return structure.row(link.direction)
     except (MultiPhiValueError, MultiPhiTypeError) as error:
@@ -47,7 +47,7 @@ def _row(structure: LinearStructure, link: AnyLink) -> np.ndarray:
 
 
 def check_modes(modes: Any) -> None:
-    """Refuse what is no choice of a number of modes."""
+    """Raise an error for a value that is no choice of a number of modes."""
     if modes is None or isinstance(modes, (UpTo, Tolerance)) or str(modes) == "all":
         return
     needed = "need an integer >= 1, 'all', UpTo, Tolerance or None"
@@ -57,11 +57,11 @@ def check_modes(modes: Any) -> None:
         raise MultiPhiValueError(f"modes: got {modes}, {needed}")
 
 
-def check_overrides(given: Any) -> None:
-    """Refuse what are no overrides of levels."""
+def check_overrides(overrides: Any) -> None:
+    """Raise an error for a value that is no mapping of closed contacts to level overrides."""
     needed = "need {(names of closed contacts, ...): LevelOverride}"
-    if not isinstance(given, Mapping):
-        raise MultiPhiTypeError(f"overrides: got {type(given).__name__}, {needed}")
-    for key, value in given.items():
+    if not isinstance(overrides, Mapping):
+        raise MultiPhiTypeError(f"overrides: got {type(overrides).__name__}, {needed}")
+    for key, value in overrides.items():
         if not (isinstance(key, tuple) and isinstance(value, LevelOverride)):
             raise MultiPhiTypeError(f"overrides: got {key!r}: {type(value).__name__}, {needed}")

@@ -9,7 +9,7 @@ import numpy as np
 
 from multiphi_exudyn.levels.level_store import LevelStore
 from multiphi_exudyn.levels.modal_base import ModalBase
-from multiphi_exudyn.levels.mode_choice import SMALL, TRIED, Tolerance, UpTo, chosen_modes
+from multiphi_exudyn.levels.mode_choice import SMALL, TRIED, Tolerance, UpTo, choose_mode_count
 from multiphi_exudyn.mechanics.element_table import ElementTable
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
@@ -17,7 +17,7 @@ __all__ = ["SharedBase"]
 
 
 class SharedBase(ElementTable):
-    """What a model (model.py) takes from its store, and says of its number of modes."""
+    """The part of a model (model.py) that holds its base and its number of modes, from its level store."""
 
     structure: LinearStructure
     modes: int | str | UpTo | Tolerance | None
@@ -27,34 +27,34 @@ class SharedBase(ElementTable):
     @functools.cached_property
     def base(self) -> ModalBase:
         """Coordinates common to all levels, built on first use."""
-        _ = self._chosen if self.modes is None else None  # it may need a larger one
+        _ = self._chosen_modes if self.modes is None else None  # the choice may need a larger base
         return self._shared_base()
 
     def _shared_base(self) -> ModalBase:
-        """The base of all models that share levels with this one."""
-        store = self._shared
-        return store.base or store.built(store.first if self.modes is None else self.most_modes)
+        """Return the base of all models that share levels with this one."""
+        store = self._shared_store
+        return store.base or store.built_base(store.first if self.modes is None else self.most_modes)
 
     @property
-    def _shared(self) -> LevelStore:
-        """What is shared with other models."""
-        assert self._store is not None, "a model begins with a store"
+    def _shared_store(self) -> LevelStore:
+        """Store that this model shares with other models."""
+        assert self._store is not None, "a model has a store"
         return self._store
 
-    def _begin_anew(self) -> LevelStore:
-        """A store without levels; what is known of the structure is taken over."""
+    def _new_store(self) -> LevelStore:
+        """Replace the store by one without levels, which reuses the modes of the structure, and return it."""
         store = LevelStore(self.structure, self.contacts, self._store)
         object.__setattr__(self, "_store", store)
         return store
 
     @property
     def most_modes(self) -> int | None:
-        """The largest number of modes that a level is asked for, chosen where none was given; None: it has all of them.
+        """Largest number of modes of a level, chosen where none was given; None for all.
 
-        Of a Tolerance that has not decided yet it is the number that its runs begin with.
+        For a Tolerance without a run it is the number of modes of its first run.
         """
         if self.modes is None:
-            return self._chosen
+            return self._chosen_modes
         if self._decisions:
             return self._decisions[0].most_modes
         if isinstance(self.modes, str):
@@ -64,39 +64,39 @@ class SharedBase(ElementTable):
         return most if most < self.structure.n else None
 
     @property
-    def _chosen(self) -> int | None:
-        """The number of modes where none was given."""
+    def _chosen_modes(self) -> int | None:
+        """Number of modes, chosen where none was given; None for all."""
         if self.structure.n <= SMALL:
             return None
-        while self._shared.chosen is None:
+        while self._shared_store.chosen is None:
             base = self._shared_base()
-            found = chosen_modes(self.structure, base, self._shared.level)
-            if self._shared.serves(found):
-                self._shared.chosen = found
+            count = choose_mode_count(self.structure, base, self._shared_store.level)
+            if self._shared_store.serves(count):
+                self._shared_store.chosen = count
             else:
-                self._begin_anew().first = found
-        return self._shared.chosen
+                self._new_store().first = count
+        return self._shared_store.chosen
 
     @property
     def whole(self) -> bool:
-        """Whether no level leaves out a mode of the structure."""
+        """Whether every level has all modes of the structure."""
         return self.most_modes is None and not isinstance(self.modes, UpTo) and self.base.complete
 
     def lacking(self, rows: np.ndarray) -> list[np.ndarray]:
-        """Those of some rows (k, n) for which an incomplete base has not been made, zero ones left out."""
+        """Return those rows (k, n), without zero ones, that an incomplete base does not represent."""
         if self.base.complete:
             return []
         links = [self.structure.row(link.direction) for link in self.links]
-        known = np.vstack([self.base.further, self.structure.point_rows, *links])
-        return [row for row in rows if np.any(row) and not np.any(np.all(row == known, axis=1))]
+        represented = np.vstack([self.base.load_rows, self.structure.point_rows, *links])
+        return [row for row in rows if np.any(row) and not np.any(np.all(row == represented, axis=1))]
 
     def outside(self, row: np.ndarray) -> float:
-        """Share of the static flexibility at a row (n,) that the base does not hold."""
+        """Return the share of the static flexibility at a row (n,) that the base does not represent."""
         _ = self.base
-        return self._shared.outside(row)
+        return self._shared_store.outside(row)
 
     def _can_share(self) -> bool:
-        """Whether the levels built for another number of modes serve this model too."""
+        """Return whether this model can use the levels that its store has for another number of modes."""
         store = self._store
         if store is None or store.structure is not self.structure or store.contacts != self.contacts:
             return False

@@ -22,18 +22,18 @@ from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, en
 from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
 
-__all__ = ["Asymptotic", "neutral_response", "static_response"]
+__all__ = ["Asymptotic", "response_of_neutral_level", "static_response"]
 
 NONE = np.zeros((0, 0))  # rigid-body motions of a structure that has none
 
 
 @dataclass(frozen=True)
 class Asymptotic:
-    """What a level's modes cannot represent: its state of rest under gaps and static loads.
+    """Static response of a level to gaps and static loads, x_inf of eq. (38.4).
 
-    configuration: y_inf (m,). gaps: of all links there (l,) [m]. forces: lambda_inf of the closed contacts (k,) [N].
-    drive: force (r,) on the zero-frequency modes. load: the static load's modal force Phi_l^T f (r,). strain,
-    potential: strain energy of y_inf [J], and the same less f.y_inf.
+    configuration: y_inf (m,). gaps: of all links at y_inf (l,) [m]. forces: lambda_inf of the closed contacts (k,) [N].
+    drive: modal force (r,) on the zero-frequency modes, zero on the others. load: modal force Phi_l^T f (r,) of the
+    static load. strain, potential: strain energy of y_inf [J], and the same minus f.y_inf.
     """
 
     configuration: np.ndarray
@@ -48,136 +48,147 @@ class Asymptotic:
 def static_response(
     base: ModalBase, closed_directions: ClosedDirections, load: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (d,) along closed directions and configuration y (m,) at rest, motion nobody resists left out."""
+    """Return forces (d,) along closed directions and y (m,) of the static response, without unresisted motion."""
     if len(closed_directions.stiffness) == 1 and not base.modes.rigid:
         along, configuration = np.ascontiguousarray(closed_directions.vectors[:, 0]), np.empty(len(load))
         stiffness, offset = float(closed_directions.stiffness[0]), float(closed_directions.offsets[0])
-        force = bend(along, base.compliance, np.array(load, float), configuration, stiffness, offset, len(load))
+        force = single_response(
+            along, base.compliance, np.array(load, float), configuration, stiffness, offset, len(load)
+        )
         if math.isfinite(force):
             return np.array([force]), configuration
-    turned, mixing = closed_directions.orthogonal
-    forces, configuration = _response(base, turned, load)
-    if turned is not closed_directions:
+    orthogonal, mixing = closed_directions.orthogonal
+    forces, configuration = _response(base, orthogonal, load)
+    if orthogonal is not closed_directions:
         forces[closed_directions.rigid] = np.linalg.solve(mixing, forces[closed_directions.rigid])
     return forces, configuration
 
 
 @compiled
-def bend_one(
+def single_direction_response(
     along: Numbers, compliance: Numbers, load: Numbers, result: Numbers, stiffness: float, offset: float, m: int
 ) -> float:
-    """The force along one direction p (m,), and y (m,) as the result; infinite or no number where it has no answer.
+    """Return the force along one direction p (m,) and write y (m,) to the result; infinite or NaN without a solution.
 
-    As ``_response`` for one direction, the force corrected once by what soft modes have magnified.
+    The same as ``_response`` for one direction. The force is corrected once for round-off magnified by soft modes.
     """
     sprung = 1.0 if stiffness != 0.0 else 0.0
-    own, bent, pressed = 1.0 / stiffness if stiffness != 0.0 else 1.0, 0.0, 0.0
+    compliance_of_spring, deflection, loaded_deflection = 1.0 / stiffness if stiffness != 0.0 else 1.0, 0.0, 0.0
     for i in range(m):
-        bent += along[i] * (compliance[i] * along[i])
-        pressed += load[i] * (compliance[i] * along[i])
-    flexibility = own + sprung * bent
+        deflection += along[i] * (compliance[i] * along[i])
+        loaded_deflection += load[i] * (compliance[i] * along[i])
+    flexibility = compliance_of_spring + sprung * deflection
     if flexibility == 0.0:
         return math.inf
-    force, left = (-offset - sprung * pressed) / flexibility, 0.0
+    force, moved = (-offset - sprung * loaded_deflection) / flexibility, 0.0
     for i in range(m):
-        pushed = along[i] * force
-        total = load[i] + pushed
-        if abs(total) <= ZERO * (abs(load[i]) + abs(pushed)):
+        contact_force = along[i] * force
+        total = load[i] + contact_force
+        if abs(total) <= ZERO * (abs(load[i]) + abs(contact_force)):
             total = 0.0
         result[i] = compliance[i] * total
-        left += along[i] * result[i]
-    further = -(offset + own * force + sprung * left) / flexibility
+        moved += along[i] * result[i]
+    correction = -(offset + compliance_of_spring * force + sprung * moved) / flexibility
     for i in range(m):
-        result[i] += compliance[i] * along[i] * further
-    return force + further
+        result[i] += compliance[i] * along[i] * correction
+    return force + correction
 
 
-bend = entry(bend_one)
+single_response = entry(single_direction_response)
 
 
-def neutral_response(
+def response_of_neutral_level(
     base: ModalBase, closed_directions: ClosedDirections, neutral: np.ndarray, total: np.ndarray, closed: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(f, y, what drives zero-frequency modes) where springs cancel the stiffness of modes ``neutral`` (m, z) exactly.
+    """Return (f, y, force on zero-frequency modes) where springs cancel the stiffness of modes ``neutral`` (m, z).
 
     closed: names of the closed contacts.
     """
     if np.any(closed_directions.rigid):
         raise NumericalFailure(
             f"level {', '.join(closed)}: negative stiffness cancels that of a mode beside closed rigid contacts, so "
-            "there is no state of rest"
+            "there is no equilibrium"
         )
-    pushing = total - closed_directions.vectors @ closed_directions.constants
-    _, found = static_response(base, closed_directions, total - neutral @ (neutral.T @ pushing))
-    configuration = found - neutral @ (neutral.T @ found)
+    driving = total - closed_directions.vectors @ closed_directions.constants
+    _, response = static_response(base, closed_directions, total - neutral @ (neutral.T @ driving))
+    configuration = response - neutral @ (neutral.T @ response)
     return (
         -closed_directions.constants - closed_directions.stiffness * (closed_directions.vectors.T @ configuration),
         configuration,
-        pushing,
+        driving,
     )
 
 
 def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """``static_response`` where the directions of rigid contacts are orthogonal."""
     rigid, compliance, offsets = base.modes.rigid, base.compliance, closed_directions.offsets
-    vectors, touching, pressing = closed_directions.vectors, closed_directions.vectors[rigid:], load[rigid:]
-    sprung = closed_directions.stiffness != 0  # the others push with G, whatever y is
-    own, carried = 1 / np.where(sprung, closed_directions.stiffness, 1.0), _carried(base, closed_directions)
-    bent = (compliance * touching.T).T
-    solved = _solver(touching.T @ bent, own, sprung, vectors[:rigid].T @ carried)
-    forces, moved = solved(-offsets - sprung * (pressing @ bent), -(load[:rigid] @ carried))
-    total = drop_round_off(pressing + touching @ forces, np.abs(pressing) + np.abs(touching) @ np.abs(forces))
-    configuration = _above(carried, moved, compliance * total)
-    left = offsets + own * forces + sprung * (configuration @ vectors)
-    further, moved = solved(-left, np.zeros(len(moved)))  # what soft modes magnified
-    return forces + further, configuration + _above(carried, moved, bent @ further)
+    vectors, elastic_vectors, elastic_load = closed_directions.vectors, closed_directions.vectors[rigid:], load[rigid:]
+    sprung = closed_directions.stiffness != 0  # the others have the constant force G
+    spring_compliance, resisted = (
+        1 / np.where(sprung, closed_directions.stiffness, 1.0),
+        _resisted_motions(base, closed_directions),
+    )
+    deflections = (compliance * elastic_vectors.T).T
+    solve = _solver(elastic_vectors.T @ deflections, spring_compliance, sprung, vectors[:rigid].T @ resisted)
+    forces, rigid_motion = solve(-offsets - sprung * (elastic_load @ deflections), -(load[:rigid] @ resisted))
+    total = drop_round_off(
+        elastic_load + elastic_vectors @ forces, np.abs(elastic_load) + np.abs(elastic_vectors) @ np.abs(forces)
+    )
+    configuration = _with_rigid_motion(resisted, rigid_motion, compliance * total)
+    violation = offsets + spring_compliance * forces + sprung * (configuration @ vectors)
+    correction, rigid_motion = solve(-violation, np.zeros(len(rigid_motion)))  # round-off magnified by soft modes
+    return forces + correction, configuration + _with_rigid_motion(resisted, rigid_motion, deflections @ correction)
 
 
-def _carried(base: ModalBase, closed_directions: ClosedDirections) -> np.ndarray:
-    """Orthonormal basis (rigid, .) of the rigid-body motions that closed contacts resist."""
+def _resisted_motions(base: ModalBase, closed_directions: ClosedDirections) -> np.ndarray:
+    """Return an orthonormal basis (rigid, .) of the rigid-body motions that closed contacts resist."""
     rigid = base.modes.rigid
     if not rigid:
         return NONE
     return _range(closed_directions.resisting[:rigid], INDEPENDENT * closed_directions.size)
 
 
-def _above(carried: np.ndarray, moved: np.ndarray, elastic: np.ndarray) -> np.ndarray:
-    """Rigid-body motions that contacts resist, above elastic coordinates."""
-    return np.concatenate([carried @ moved, elastic]) if len(carried) else elastic
+def _with_rigid_motion(resisted: np.ndarray, rigid_motion: np.ndarray, elastic: np.ndarray) -> np.ndarray:
+    """Return coordinates (m,): of the resisted rigid-body motions, then elastic ones."""
+    return np.concatenate([resisted @ rigid_motion, elastic]) if len(resisted) else elastic
 
 
 Solver: TypeAlias = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def _solver(bent: np.ndarray, own: np.ndarray, sprung: np.ndarray, coupling: np.ndarray) -> Solver:
-    """f (d,), z (k,) of [[S bent + own, S coupling], [coupling^T, 0]] (f, z) = (a, b) from a (d,) and b (k,), S 0 or 1.
+def _solver(flexibility: np.ndarray, spring_compliance: np.ndarray, sprung: np.ndarray, coupling: np.ndarray) -> Solver:
+    """Solver for f (d,), z (k,) of [[S F + C, S coupling], [coupling^T, 0]] (f, z) = (a, b), S = 0 or 1.
 
-    Scaled by the sizes of the unknowns, and of the rows: pivots then do not hang on units. The smallest solution where
-    the matrix is singular: springs that cancel, under a load they allow.
+    Unknowns and rows are scaled, so that pivots do not depend on units. Where springs cancel and the matrix is
+    singular, the solution is the shortest one.
     """
-    d = len(own)
-    sizes = _sizes(bent.diagonal() + sprung * np.abs(own), coupling)
+    d = len(spring_compliance)
+    sizes = _sizes(flexibility.diagonal() + sprung * np.abs(spring_compliance), coupling)
     matrix = np.zeros((d + coupling.shape[1],) * 2)
-    matrix[:d, :d], matrix[:d, d:], matrix[d:, :d] = sprung[:, None] * bent, sprung[:, None] * coupling, coupling.T
-    matrix.flat[: d * (len(matrix) + 1) : len(matrix) + 1] += own
+    matrix[:d, :d], matrix[:d, d:], matrix[d:, :d] = (
+        sprung[:, None] * flexibility,
+        sprung[:, None] * coupling,
+        coupling.T,
+    )
+    matrix.flat[: d * (len(matrix) + 1) : len(matrix) + 1] += spring_compliance
     matrix *= sizes
     lengths = np.abs(matrix).max(axis=1, initial=0.0)
     rows = 1 / np.where(lengths > 0, lengths, 1.0)
     scaled = rows[:, None] * matrix
 
-    def solved(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        given = rows * np.concatenate([a, b])
+    def solve(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        right_side = rows * np.concatenate([a, b])
         try:
-            found = sizes * np.linalg.solve(scaled, given)
+            solution = sizes * np.linalg.solve(scaled, right_side)
         except np.linalg.LinAlgError:
-            found = sizes * np.linalg.lstsq(scaled, given, rcond=None)[0]
-        return found[:d], found[d:]
+            solution = sizes * np.linalg.lstsq(scaled, right_side, rcond=None)[0]
+        return solution[:d], solution[d:]
 
-    return solved
+    return solve
 
 
 def _sizes(flexibilities: np.ndarray, coupling: np.ndarray) -> np.ndarray:
-    """Of the unknowns (d + k,), to which rows and columns are scaled."""
+    """Return the sizes (d + k,) of the unknowns, by which columns are scaled."""
     forces = 1 / np.sqrt(np.where(flexibilities > 0, flexibilities, 1.0))
     if not coupling.size:
         return np.concatenate([forces, np.ones(coupling.shape[1])])
@@ -186,7 +197,7 @@ def _sizes(flexibilities: np.ndarray, coupling: np.ndarray) -> np.ndarray:
 
 
 def _range(matrix: np.ndarray, negligible: float) -> np.ndarray:
-    """Orthonormal basis of the column space, singular values up to ``negligible`` taken for zero."""
+    """Return an orthonormal basis of the column space; singular values up to ``negligible`` count as zero."""
     if matrix.size == 0:
         return np.zeros((matrix.shape[0], 0))
     left, singular, _ = np.linalg.svd(matrix, full_matrices=False)

@@ -1,8 +1,8 @@
-"""Mathematics: what the method computes with, of matrices and functions of time; it knows no structure.
+"""Mathematics of matrices and functions of time for the method; it does not depend on structures.
 
 Modes and their exact free and forced response as sums of exponentials; the certified search for the instant at which
 such a sum first falls through zero; functions of time as piecewise exponentials and as pieces of straight lines; the
-small complementarity problem of contact and friction; what round-off is; functions on flat buffers, compiled or plain.
+small complementarity problem of contact and friction; round-off; functions on flat buffers, compiled or plain.
 
 Order: bounded_cache, compiling, round_off, eigenproblems, response, search, complementarity, functions.
 """

@@ -1,6 +1,6 @@
-"""Bounded cache: a mapping of bounded length that lets the least recently used go.
+"""Bounded cache: a mapping of bounded length that drops the least recently used entry.
 
-What is kept here can be made again from its key, to the bit; a bound costs time, and never changes a result.
+Entries can be built again from their keys, bit by bit; the bound costs time, and never changes a result.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ V = TypeVar("V")
 
 
 class BoundedCache(Generic[K, V]):
-    """At most ``most`` entries. dropped: told of every entry that is let go. kept: how many were ever put in."""
+    """At most ``most`` entries. dropped: called with every dropped entry. kept: number of entries ever added."""
 
     def __init__(self, most: int, dropped: Callable[[K, V], None] | None = None) -> None:
         self.most = most
@@ -24,14 +24,14 @@ class BoundedCache(Generic[K, V]):
         self._entries: dict[K, V] = {}  # in the order of their last use
 
     def find(self, key: K) -> V | None:
-        """The entry, which is then the one used last; None where there is none."""
-        found = self._entries.pop(key, None)
-        if found is not None:
-            self._entries[key] = found
-        return found
+        """Return the entry, which becomes the one used last, or None."""
+        entry = self._entries.pop(key, None)
+        if entry is not None:
+            self._entries[key] = entry
+        return entry
 
     def keep(self, key: K, value: V) -> V:
-        """Put an entry in, in place of one of the same key; returns it."""
+        """Add an entry, in place of one of the same key, and return it."""
         self._entries.pop(key, None)
         self._entries[key] = value
         self.kept += 1
@@ -39,27 +39,27 @@ class BoundedCache(Generic[K, V]):
             self.drop(next(iter(self._entries)))
         return value
 
-    def get_or_build(self, key: K, make: Callable[[], V]) -> V:
-        """The entry, made and put in where there is none."""
-        found = self._entries.pop(key, None)
-        if found is None:
-            return self.keep(key, make())
-        self._entries[key] = found
-        return found
+    def get_or_build(self, key: K, build: Callable[[], V]) -> V:
+        """Return the entry, built and added if it is missing."""
+        entry = self._entries.pop(key, None)
+        if entry is None:
+            return self.keep(key, build())
+        self._entries[key] = entry
+        return entry
 
     def drop(self, key: K) -> None:
-        """Let an entry go, if there is one."""
-        gone = self._entries.pop(key, None)
-        if gone is not None and self._dropped is not None:
-            self._dropped(key, gone)
+        """Drop an entry, if it exists."""
+        entry = self._entries.pop(key, None)
+        if entry is not None and self._dropped is not None:
+            self._dropped(key, entry)
 
     def clear(self) -> None:
-        """Let every entry go."""
+        """Drop all entries."""
         for key in list(self._entries):
             self.drop(key)
 
     def items(self) -> ItemsView[K, V]:
-        """All entries, the one used last at the end; looking does not use them."""
+        """Return all entries, the one used last at the end, without changing their order."""
         return self._entries.items()
 
     def __len__(self) -> int:

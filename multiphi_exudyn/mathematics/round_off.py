@@ -2,7 +2,7 @@
 
     |sum a_j| <= ZERO sum |a_j|   is round-off: the sum has no sign
 
-A sum is judged by the sizes of its own terms, so other units of time, length and mass change no decision.
+A sum is compared with the sizes of its own terms, so decisions do not depend on units.
 """
 
 from __future__ import annotations
@@ -17,34 +17,34 @@ __all__ = ["BALANCED", "CLEAR", "DEFECTIVE", "SLOW", "WORST_CONDITION", "ZERO", 
 __all__ += ["drop_round_off", "sign_of"]
 
 ZERO = 1e-13  # of the sum of |terms|: a sum below it is round-off
-DEFECTIVE = 1e5  # condition of eigenvectors from which on those near each other are one cluster; at a double root 1e8
-WORST_CONDITION = 1e7  # of eigenvectors of which no clusters are found; times round-off it is the motion's error
-SLOW = 0.1  # of 1 / |lambda|: a motion no longer than that is a few powers of time, without 1 / lambda in them
+DEFECTIVE = 1e5  # condition of eigenvectors, from which close ones form a cluster; at a double root 1e8
+WORST_CONDITION = 1e7  # of eigenvectors without clusters; times round-off it is the error of the motion
+SLOW = 0.1  # of 1 / |lambda|: a shorter motion is given by a few powers of time, without 1 / lambda
 BALANCED = 1e-9  # of the sum of |forces|: a resultant below it is round-off of their directions and of modes
-CLEAR = 2 * ZERO  # of a sum's terms: above it another order of adding them does not bring the sum down to ZERO
+CLEAR = 2 * ZERO  # of a sum's terms: a larger sum is above ZERO for any order of addition
 
 
 def all_finite(values: np.ndarray) -> bool:
-    """Whether no value (k,) is NaN or infinite."""
+    """Return whether no value (k,) is NaN or infinite."""
     return math.isfinite(values.dot(values)) or bool(np.count_nonzero(np.isfinite(values)) == values.size)
 
 
 def drop_round_off(sums: np.ndarray, sizes: np.ndarray | np.floating) -> np.ndarray:
-    """Sums with zero where they are round-off of their terms, which add up to ``sizes`` without their signs.
+    """Return sums with zeros in place of round-off; sizes: the sums of the absolute values of their terms.
 
-    The gap of a contact that another one holds does not move; what is left of it has no sign.
+    The gap of a contact that another one keeps constant has a rate of round-off, which has no sign.
     """
-    kept = sums.copy()
-    np.putmask(kept, np.abs(sums) <= ZERO * sizes, 0.0)
-    return kept
+    result = sums.copy()
+    np.putmask(result, np.abs(sums) <= ZERO * sizes, 0.0)
+    return result
 
 
 @compiled
 def clear_products(numbers: Numbers, products: int, given: int, matrix: Numbers, row_sums: int, count: int) -> None:
-    """Products A x (count,) of given x become zero where they are round-off of their terms, which add up to |A| |x|.
+    """Set products A x (count,) to zero where they are round-off of their terms, |A| |x|.
 
-    matrix: |A|, row by row. They are no more than ``row_sums``, those of |A|, times the largest |x|: only where that
-    does not tell are they added up.
+    matrix: |A|, row by row. The terms are at most ``row_sums`` of |A| times the largest |x|; they are added up only
+    where this bound does not decide.
     """
     largest = 0.0
     for j in range(count):
@@ -52,7 +52,7 @@ def clear_products(numbers: Numbers, products: int, given: int, matrix: Numbers,
     for i in range(count if largest > 0.0 else 0):
         if abs(numbers[products + i]) <= CLEAR * (numbers[row_sums + i] * largest):
             row, first, second, third, fourth = i * count, 0.0, 0.0, 0.0, 0.0
-            for j in range(0, count - 3, 4):  # four sums that do not wait for each other
+            for j in range(0, count - 3, 4):  # four independent sums
                 first += matrix[row + j] * abs(numbers[given + j])
                 second += matrix[row + j + 1] * abs(numbers[given + j + 1])
                 third += matrix[row + j + 2] * abs(numbers[given + j + 2])
@@ -64,7 +64,7 @@ def clear_products(numbers: Numbers, products: int, given: int, matrix: Numbers,
 
 
 def sign_of(terms: np.ndarray, constant: float, size: float = 0.0) -> int:
-    """Sign of a sum, zero where it is round-off of its terms and of ``size``."""
+    """Return the sign of a sum, zero where it is round-off of its terms and of ``size``."""
     values = terms.tolist()
     value = sum(values) + constant
     if abs(value) <= ZERO * (sum(map(abs, values)) + abs(constant) + size):

@@ -60,7 +60,7 @@ class TestFewModesOfALevel:
     def test_one_contact_away_take_no_singular_values_and_no_iterations(self, monkeypatch, stiffness, twins):
         base = bed(stiffness, n=80 if twins else 160, twins=twins).base
         full = build_level(base, (7,))
-        for needless in ("right_singular_vectors", "_of_all", "_iterated"):
+        for needless in ("right_singular_vectors", "_dense_eigenvectors", "_lanczos_eigenvectors"):
             monkeypatch.setattr(f"multiphi_exudyn.levels.level_modes.{needless}", None)
         few = build_level(base, (7,), 12)
         assert_allclose(few.omega, full.omega[:12], rtol=FREQUENCIES)
@@ -87,7 +87,7 @@ class TestFewModesOfALevel:
     @pytest.mark.parametrize("stiffness", [10.0, 1e6, math.inf])
     def test_are_iterated_in_a_large_base(self, monkeypatch, stiffness):
         base, made = bed(stiffness).base, []
-        monkeypatch.setattr("multiphi_exudyn.levels.level_modes._of_all", lambda *given: made.append(given))
+        monkeypatch.setattr("multiphi_exudyn.levels.level_modes._dense_eigenvectors", lambda *given: made.append(given))
         for indices in SETS:
             assert build_level(base, indices, 12).modes == 12
         assert not made

@@ -51,7 +51,7 @@ def arbitrary(request, monkeypatch):
 
 class TestTurned:
     def turned(self, squares, shapes, rows):
-        return modes.turned(np.array(squares), shapes, rows, np.ones(len(rows) + len(shapes)))[:2]
+        return modes.aligned_modes(np.array(squares), shapes, rows, np.ones(len(rows) + len(shapes)))[:2]
 
     def test_gives_one_basis_whatever_basis_it_is_given(self):
         random = np.random.default_rng(0)

@@ -37,7 +37,7 @@ def moved(response, start, force, t):
 
 
 def assert_free_mass(rate, duration, velocity, force):
-    response = modal_response(np.zeros(1), np.array([[rate]]), lasting=duration)
+    response = modal_response(np.zeros(1), np.array([[rate]]), duration=duration)
     way, _ = free_mass(rate, duration, velocity, force)
     for t in (duration, duration / 3, duration / 100):
         found = moved(response, (np.zeros(1), np.array([velocity])), np.array([force]), t)
@@ -62,7 +62,7 @@ class TestFreeMass:
         forms = []
         for unit in (1e-12, 1.0, 1e12):
             for share in (0.99, 1.01):
-                response = modal_response(np.zeros(1), np.array([[share * SLOW / unit]]), lasting=unit)
+                response = modal_response(np.zeros(1), np.array([[share * SLOW / unit]]), duration=unit)
                 forms.append(tuple(response.basis.powers.tolist()))
         assert len(set(forms[::2])) == len(set(forms[1::2])) == 1
         assert forms[0] != forms[1]
@@ -70,8 +70,8 @@ class TestFreeMass:
     def test_is_continuous_where_the_form_changes(self):
         start, force = (np.zeros(1), np.ones(1)), np.ones(1)
         damping = np.array([[SLOW]])
-        slow = modal_response(np.zeros(1), damping, lasting=1.0)
-        fast = modal_response(np.zeros(1), damping, lasting=1.0001)
+        slow = modal_response(np.zeros(1), damping, duration=1.0)
+        fast = modal_response(np.zeros(1), damping, duration=1.0001)
         assert len(slow.basis.rates) > len(fast.basis.rates)
         assert_allclose(moved(slow, start, force, 1.0), moved(fast, start, force, 1.0), rtol=0, atol=1e-13)
 
@@ -92,7 +92,7 @@ class TestCoupled:
     def test_moves_as_the_matrix_exponential(self, forced, free, duration):
         for seed, rate in enumerate(RATES[1:]):
             squares, damping = self.damped(rate, free, seed)
-            response = modal_response(squares, damping, lasting=duration)
+            response = modal_response(squares, damping, duration=duration)
             start, force = np.random.default_rng(seed).normal(size=(2, len(squares))), np.where(squares == 0, forced, 0)
             for t in (duration, duration / 7):
                 expected = exactly(squares, damping, start, force, t)
@@ -102,7 +102,7 @@ class TestCoupled:
     def test_modes_of_zero_frequency_alone(self, forced):
         """All parts are slow, and none is left beside them."""
         damping = 1e-8 * np.array([[2.0, 1.0], [1.0, 3.0]])
-        response = modal_response(np.zeros(2), damping, lasting=10.0)
+        response = modal_response(np.zeros(2), damping, duration=10.0)
         start, force = np.array([[0.3, -1.0], [2.0, 0.7]]), np.array([1.0, -2.0]) * forced
         expected = exactly(np.zeros(2), damping, start, force, 10.0)
         assert_allclose(moved(response, start, force, 10.0), expected, rtol=1e-14)
@@ -110,7 +110,7 @@ class TestCoupled:
     def test_beside_a_mode_that_nothing_damps(self):
         squares, damping = self.damped(1e-9, 1, 5)
         squares, damping = np.insert(squares, 0, 0.0), np.pad(damping, (1, 0))
-        response = modal_response(squares, damping, lasting=5.0)
+        response = modal_response(squares, damping, duration=5.0)
         start, force = np.random.default_rng(1).normal(size=(2, 5)), np.array([1.0, -2.0, 0.0, 0.0, 0.0])
         expected = exactly(squares, damping, start, force, 5.0)
         assert_allclose(moved(response, start, force, 5.0), expected, atol=1e-12)
@@ -121,7 +121,7 @@ class TestForced:
 
     def assert_moves(self, squares, damping, rate, horizon):
         r = len(squares)
-        response, force = modal_response(squares, damping, lasting=horizon), np.arange(1.0, r + 1)
+        response, force = modal_response(squares, damping, duration=horizon), np.arange(1.0, r + 1)
         x = particular(squares, damping, response, rate, force[None].astype(complex), horizon)
         after = x[1].real / horizon if len(x) > 1 else 0.0
         c = response.coefficients(-x[0].real, -(rate * x[0].real + after))

@@ -1,7 +1,7 @@
 """Compiling: functions on flat buffers, run as plain Python or as machine code; the same source for both.
 
-A function says by ``@compiled`` that numba may translate it. Its machine code is kept in a file, under a digest of
-everything that it is made of.
+``@compiled`` marks a function that numba may translate. Its machine code is stored in a file, with a digest of all
+that it depends on.
 
 Order: buffer_function, machine_code, translation, compilation, compiled_cache, compiled.
 """

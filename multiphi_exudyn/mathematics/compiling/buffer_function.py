@@ -1,15 +1,14 @@
-"""A function on flat buffers: what it may be made of, what it calls, and when it is no longer the same.
+"""Functions on flat buffers: allowed types and names, the functions that they call, and a digest that shows changes.
 
-It takes buffers and scalars, returns one scalar or nothing, and writes everything else into the buffers:
+Such a function takes buffers and scalars, returns one scalar or None, and writes all other results into the buffers:
 
     @compiled
     def kinetic(numbers: Numbers, velocity: int, r: int) -> float: ...
 
     Ints: int64 buffer   Numbers: float64 buffer   Waves: complex128 buffer   int: integer or offset   float: number
-    Shorts: int32 buffer, of what is kept long
+    Shorts: int32 buffer, for long records
 
-Of its module it uses numbers and functions marked ``compiled``; beside these ``math``, ``cmath`` and what Python has
-built in.
+It uses numbers of its module, functions marked ``compiled``, ``math``, ``cmath`` and Python's builtins.
 """
 
 from __future__ import annotations
@@ -30,8 +29,19 @@ from numpy.typing import NDArray
 
 from multiphi_exudyn.errors import MultiPhiTypeError
 
-__all__ = ["Ints", "Numbers", "Shorts", "Signature", "Waves", "callees", "check", "compiled", "digest", "lines"]
-__all__ += ["reached", "signature", "symbol"]
+__all__ = [
+    "Ints",
+    "Numbers",
+    "Shorts",
+    "Signature",
+    "Waves",
+    "callees",
+    "check_globals",
+    "compiled",
+    "digest",
+    "line_count",
+]
+__all__ += ["call_tree", "signature", "symbol"]
 
 Ints = NDArray[np.int64]
 Shorts = NDArray[np.int32]
@@ -46,7 +56,7 @@ _marked: set[FunctionType] = set()
 
 
 class Signature(NamedTuple):
-    """What a function takes and gives: of ``ARGUMENTS`` and of ``RESULTS``."""
+    """Types of the arguments and of the result of a function, from ``ARGUMENTS`` and ``RESULTS``."""
 
     arguments: tuple[Any, ...]
     result: Any
@@ -61,19 +71,19 @@ def compiled(function: Function) -> Function:
 
 @functools.cache
 def signature(function: FunctionType) -> Signature:
-    """The kinds of a function's arguments and result, from its annotations."""
+    """Return the types of a function's arguments and result, from its annotations."""
     hints = get_type_hints(function)
-    found = Signature(tuple(map(hints.get, inspect.signature(function).parameters)), hints.get("return"))
-    if found.result not in RESULTS or not set(found.arguments) <= set(ARGUMENTS):
+    types = Signature(tuple(map(hints.get, inspect.signature(function).parameters)), hints.get("return"))
+    if types.result not in RESULTS or not set(types.arguments) <= set(ARGUMENTS):
         raise MultiPhiTypeError(
             f"annotations: got {function.__qualname__}{inspect.signature(function)}, need Ints, Shorts, Numbers, "
             "Waves, int or float for every argument, and int, float or None for the result"
         )
-    return found
+    return types
 
 
 def _globals(function: FunctionType) -> dict[str, Any]:
-    """What a function names and its module has; names of attributes may be among them."""
+    """Return the globals of a module that a function names; attributes of the same name may be among them."""
     return {name: function.__globals__[name] for name in function.__code__.co_names if name in function.__globals__}
 
 
@@ -86,12 +96,12 @@ def _is_number(value: Any) -> bool:
 
 
 def callees(function: FunctionType) -> dict[str, FunctionType]:
-    """The compiled functions that a function calls, by the names it uses."""
+    """Return the compiled functions that a function calls, by the names it uses."""
     return {name: value for name, value in _globals(function).items() if _is_marked(value)}
 
 
-def reached(function: FunctionType) -> list[FunctionType]:
-    """``function`` and all that it calls, callees first."""
+def call_tree(function: FunctionType) -> list[FunctionType]:
+    """Return ``function`` and all functions that it calls, callees first."""
     order: dict[FunctionType, None] = {}
 
     def visit(current: FunctionType, above: tuple[FunctionType, ...]) -> None:
@@ -106,10 +116,10 @@ def reached(function: FunctionType) -> list[FunctionType]:
     return list(order)
 
 
-def check(function: FunctionType) -> None:
-    """Refuse what a change would not be seen of: anything of the module but numbers and compiled functions."""
-    taken = {step.argval for step in dis.get_instructions(function) if step.opname == "LOAD_GLOBAL"}
-    for name in sorted(taken & function.__globals__.keys()):
+def check_globals(function: FunctionType) -> None:
+    """Raise an error for other globals than numbers and compiled functions: the digest would not show their changes."""
+    used = {step.argval for step in dis.get_instructions(function) if step.opname == "LOAD_GLOBAL"}
+    for name in sorted(used & function.__globals__.keys()):
         value = function.__globals__[name]
         if not (_is_marked(value) or _is_number(value) or value in (math, cmath)):
             raise MultiPhiTypeError(
@@ -118,24 +128,24 @@ def check(function: FunctionType) -> None:
             )
 
 
-def lines(function: FunctionType) -> int:
-    """How many lines of a function are code."""
+def line_count(function: FunctionType) -> int:
+    """Return the number of code lines of a function."""
     return len({line for *_, line in function.__code__.co_lines()})
 
 
 def symbol(function: FunctionType) -> str:
-    """The name of a function in compiled code."""
+    """Return the name of a function in compiled code."""
     return re.sub(r"[^\w.]", "_", f"{function.__module__}.{function.__qualname__}")
 
 
 def digest(function: FunctionType) -> str:
-    """A hash of all that the compiled code of a function depends on: its own code, numbers, and how it calls others."""
+    """Return a hash of all that the compiled code depends on: own code, numbers, and how it calls others."""
     code = function.__code__
     constants = [constant for constant in code.co_consts if not isinstance(constant, str)]  # docstrings are no code
-    taken = {
+    used = {
         name: (symbol(value), signature(value)) if _is_marked(value) else value
         for name, value in _globals(function).items()
         if _is_marked(value) or _is_number(value)
     }
-    parts = (symbol(function), signature(function), code.co_code, constants, code.co_names, code.co_varnames, taken)
+    parts = (symbol(function), signature(function), code.co_code, constants, code.co_names, code.co_varnames, used)
     return hashlib.blake2b(repr(parts).encode(), digest_size=16).hexdigest()

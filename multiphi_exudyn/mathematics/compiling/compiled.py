@@ -1,8 +1,8 @@
 """Functions on flat buffers, run as plain Python or compiled.
 
-A function marked ``compiled`` keeps its name for the plain function: called from Python it runs as Python, with NumPy
-arrays as buffers. ``entry(function)`` is the same function compiled, with all that it calls, at its first call; what is
-compiled is kept on disk, and loaded from there without numba. Where numba is missing, an entry is the plain function.
+A function marked ``compiled`` stays a plain function: called from Python it runs as Python, with NumPy arrays as
+buffers. ``entry(function)`` is the same function, compiled with all its callees at its first call; the machine code is
+stored on disk, and loaded from there without numba. Where numba is missing, an entry is the plain function.
 """
 
 from __future__ import annotations
@@ -27,13 +27,18 @@ from multiphi_exudyn.mathematics.compiling.buffer_function import (
     Numbers,
     Shorts,
     Waves,
+    call_tree,
     compiled,
     digest,
-    reached,
     signature,
     symbol,
 )
-from multiphi_exudyn.mathematics.compiling.compiled_cache import cache_file, keep, kept, writable_folder
+from multiphi_exudyn.mathematics.compiling.compiled_cache import (
+    cache_file,
+    cached_objects,
+    store_objects,
+    writable_folder,
+)
 
 __all__ = ["Entry", "Ints", "Numbers", "Shorts", "Waves", "available", "compile_entries", "compiled", "entry"]
 
@@ -45,60 +50,60 @@ TYPES: dict[Any, np.dtype] = {
 }
 SCALARS: dict[Any, Any] = {int: ctypes.c_int64, float: ctypes.c_double, NoneType: None}
 
-_one_at_a_time = threading.RLock()  # neither numba nor LLVM is meant for two threads
+_one_at_a_time = threading.RLock()  # numba and LLVM are not thread-safe
 _entries: list[Entry] = []
 
 
 def available() -> bool:
-    """Whether functions are compiled: numba is installed."""
+    """Return whether functions are compiled: numba is installed."""
     return importlib.util.find_spec("numba") is not None
 
 
 def entry(function: Callable[..., Any]) -> Entry:
-    """``function`` to be called compiled, with contiguous NumPy arrays and scalars."""
+    """Return the compiled ``function``, to be called with contiguous NumPy arrays and scalars."""
     assert isinstance(function, FunctionType)
     _entries.append(Entry(function))
     return _entries[-1]
 
 
 def compile_entries() -> Path | None:
-    """Compile all entries of the modules loaded so far; the file that keeps them, None if none could be written."""
+    """Compile all entries of the loaded modules; return their file, None if it could not be written."""
     for each in _entries:
         each.native()
     return cache_file()
 
 
 class Entry:
-    """A function that Python calls compiled. ``plain``: as Python, to which overflow is no warning either."""
+    """A compiled function for Python. ``plain``: the Python function, without warnings of overflow."""
 
     def __init__(self, function: FunctionType) -> None:
         self.function = function
         self.plain: Callable[..., Any] = np.errstate(all="ignore")(function)
         self._native: Callable[..., Any] | None = None
-        self._code: Any = None  # keeps the machine code where it is
+        self._code: Any = None  # owner of the machine code
 
     def __call__(self, *arguments: Any) -> Any:
-        """What the function returns."""
+        """Call the function."""
         try:
             return (self._native or self.native())(*arguments)
         except ctypes.ArgumentError as error:
             raise MultiPhiTypeError(f"{self.function.__qualname__}: {error}") from error
 
     def bound(self, *buffers: np.ndarray) -> Callable[..., Any]:
-        """The function with its first arguments fixed, at half the cost of a call; the caller keeps the buffers."""
+        """Return the function with fixed first arguments, at half the cost of a call; the caller owns the buffers."""
         native: Any = self.native()
         if native is self.plain:
             return functools.partial(native, *buffers)
         arguments, result = signature(self.function)
         kinds = [ctypes.c_void_p if kind in TYPES else SCALARS[kind] for kind in arguments]
         address = ctypes.cast(native, ctypes.c_void_p).value or 0
-        given = [kind.from_param(buffer) for kind, buffer in zip(native.argtypes, buffers, strict=False)]
+        addresses = [kind.from_param(buffer) for kind, buffer in zip(native.argtypes, buffers, strict=False)]
         function: Any = ctypes.CFUNCTYPE(SCALARS[result], *kinds)(address)
-        function.entry = self  # which keeps the machine code
-        return functools.partial(function, *given)
+        function.entry = self  # owner of the machine code
+        return functools.partial(function, *addresses)
 
     def native(self) -> Callable[..., Any]:
-        """The function as ctypes calls it, made at the first call; ``plain`` without numba."""
+        """Return the ctypes function, built at the first call; ``plain`` without numba."""
         with _one_at_a_time:
             if self._native is None:
                 self._native = self._loaded() if available() else self.plain
@@ -108,7 +113,7 @@ class Entry:
         try:
             from multiphi_exudyn.mathematics.compiling.machine_code import load
 
-            address, self._code = load(_objects(reached(self.function)), symbol(self.function))
+            address, self._code = load(_objects(call_tree(self.function)), symbol(self.function))
         except ImportError as error:
             warnings.warn(
                 f"numba is installed but cannot be imported ({error}): the loop runs as plain Python, 50 times slower",
@@ -123,9 +128,9 @@ class Entry:
 
 
 def _objects(functions: Sequence[FunctionType]) -> list[bytes]:
-    """The object files of functions, from the disk or made anew."""
+    """Return the object files of functions, from the disk or compiled."""
     digests = _digests(functions)
-    objects = kept(digests)
+    objects = cached_objects(digests)
     if len(objects) < len(digests):
         complete = _completed(functions)
         objects = {name: complete[name] for name in digests}
@@ -133,28 +138,28 @@ def _objects(functions: Sequence[FunctionType]) -> list[bytes]:
 
 
 def _completed(functions: Sequence[FunctionType]) -> dict[str, bytes]:
-    """The object files of all that functions and entries need; those that were not kept are compiled, and kept.
+    """Return the object files of all functions and entries; missing ones are compiled and stored.
 
-    A run needs most of them, and many are shared out among processes better than a few.
+    A run needs most of them, and processes share many functions better than a few.
     """
-    needed = dict.fromkeys([*functions, *(each for one in _entries for each in reached(one.function))])
+    needed = dict.fromkeys([*functions, *(each for one in _entries for each in call_tree(one.function))])
     digests = _digests(needed)
-    known = kept(digests)
-    missing = [function for function in needed if symbol(function) not in known]
-    made = dict(zip(map(symbol, missing), _compile(missing), strict=True))
-    keep({name: (digests[name], code) for name, code in made.items()})
-    return known | made
+    cached = cached_objects(digests)
+    missing = [function for function in needed if symbol(function) not in cached]
+    compiled_now = dict(zip(map(symbol, missing), _compile(missing), strict=True))
+    store_objects({name: (digests[name], code) for name, code in compiled_now.items()})
+    return cached | compiled_now
 
 
 def _digests(functions: Collection[FunctionType]) -> dict[str, str]:
-    """Digests of functions by their symbols."""
+    """Return the digests of functions by their symbols."""
     digests = {symbol(function): digest(function) for function in functions}
     assert len(digests) == len(functions), "two functions of one name"
     return digests
 
 
 def _compile(functions: Sequence[FunctionType]) -> list[bytes]:
-    """The object files of functions, announced by a line on stderr."""
+    """Return the object files of functions, compiled after a line on stderr."""
     from multiphi_exudyn.mathematics.compiling.compilation import compile_functions, expected_seconds
 
     often = "once on this machine" if writable_folder() else "in every process: no folder to keep it in is writable"
@@ -163,9 +168,9 @@ def _compile(functions: Sequence[FunctionType]) -> list[bytes]:
 
 
 class _Buffer:
-    """What a buffer is for ctypes: the address of its first number, remembered for the array asked about last.
+    """Argument type of a buffer for ctypes: the address of its first number, cached for the last array.
 
-    That array may be deleted meanwhile, but not moved: NumPy enlarges no array in its place that somebody remembers.
+    That array may be deleted meanwhile, but not moved: NumPy does not resize an array with a weak reference in place.
     """
 
     def __init__(self, dtype: np.dtype) -> None:
@@ -173,7 +178,7 @@ class _Buffer:
         self._last: tuple[Callable[[], Any], ctypes.c_void_p] = (lambda: self, ctypes.c_void_p())
 
     def from_param(self, array: np.ndarray) -> ctypes.c_void_p:
-        """The address of an array."""
+        """Return the address of an array."""
         last, address = self._last
         return address if last() is array else self._address(array)
 
@@ -181,11 +186,11 @@ class _Buffer:
         if not (isinstance(array, np.ndarray) and array.dtype == self._dtype and array.flags.carray):
             got = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
             raise MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}")
-        address = ctypes.c_void_p(_place(array))
+        address = ctypes.c_void_p(_address_of(array))
         self._last = (weakref.ref(array), address)
         return address
 
 
-def _place(array: np.ndarray) -> int:
-    """Where the first number of an array stands, which NumPy itself takes longer to tell."""
+def _address_of(array: np.ndarray) -> int:
+    """Return the address of the first number of an array, faster than NumPy does."""
     return ctypes.addressof(ctypes.c_char.from_buffer(array.data)) if array.size else array.ctypes.data

@@ -1,9 +1,9 @@
-"""Where compiled functions are kept: one file for this package, this machine and these versions.
+"""Cache of compiled functions: one file for this package, this machine and these versions.
 
     header: a hash of the rest   rest: {symbol: (digest of the function, its object file)}
 
-A function whose digest is another one, a file that is damaged or of another machine, and a folder that cannot be read
-count as not there. A file is replaced whole, so that whoever reads it meanwhile has the old one or the new one.
+Functions with another digest, damaged files, files of another machine, and folders that cannot be read are ignored. A
+file is replaced as a whole, so that a process that reads it meanwhile gets the old one or the new one.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-__all__ = ["Kept", "cache_folders", "file_name", "keep", "kept", "writable_folder"]
+__all__ = ["StoredObjects", "cache_folders", "cached_objects", "file_name", "store_objects", "writable_folder"]
 
-Kept = dict[str, tuple[str, bytes]]  # symbol: (digest, object file)
+StoredObjects = dict[str, tuple[str, bytes]]  # symbol: (digest, object file)
 
 PACKAGE = Path(__file__).parents[2]
 HASH_SIZE = 32  # bytes
 SETTINGS = ("CPU_NAME", "CPU_FEATURES", "ENABLE_AVX")  # NUMBA_...
-LAYOUT = 2  # of the file, and of how functions call one another: another number for another one
+LAYOUT = 2  # version of the file's layout and of the calls between functions
 
 
 def _hash(content: bytes, size: int = HASH_SIZE) -> bytes:
@@ -34,7 +34,7 @@ def _hash(content: bytes, size: int = HASH_SIZE) -> bytes:
 
 @functools.cache
 def file_name() -> str:
-    """The name of the file for this machine, the installed versions and numba's settings."""
+    """Return the name of the file for this machine, the installed versions and numba's settings."""
     from multiphi_exudyn.mathematics.compiling.machine_code import this_cpu
 
     versions = [importlib.metadata.version(name) for name in ("numba", "llvmlite")]
@@ -44,15 +44,15 @@ def file_name() -> str:
 
 
 def cache_folders() -> list[Path]:
-    """Where the file may be: NUMBA_CACHE_DIR alone if it is set, else in the package, else in the user's folder."""
-    place = f"multiphi_exudyn_{_hash(str(PACKAGE).encode(), 8).hex()}"  # another copy of the package has its own
+    """Return the folders of the file: NUMBA_CACHE_DIR alone if set, else the package and the user's folder."""
+    place = f"multiphi_exudyn_{_hash(str(PACKAGE).encode(), 8).hex()}"  # one for each copy of the package
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         return [Path(chosen) / place]
     return [PACKAGE / "__pycache__", _user_cache() / place]
 
 
 def _user_cache() -> Path:
-    """Where programs keep what they can make again, as this system has it."""
+    """Return the folder for caches of programs on this system."""
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
     if sys.platform == "darwin":
@@ -61,7 +61,7 @@ def _user_cache() -> Path:
 
 
 def writable_folder() -> Path | None:
-    """The first folder that can be written to; it is made."""
+    """Return the first folder that can be written to, created if needed."""
     for folder in cache_folders():
         with contextlib.suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)
@@ -71,22 +71,22 @@ def writable_folder() -> Path | None:
 
 
 def cache_file() -> Path | None:
-    """The file that is read, None if there is none."""
+    """Return the file that is read, None if there is none."""
     return next((folder / file_name() for folder in cache_folders() if (folder / file_name()).exists()), None)
 
 
-def kept(wanted: Mapping[str, str]) -> dict[str, bytes]:
-    """The object files of those functions, by symbol, that are kept with the digest that is wanted."""
-    found = {}
+def cached_objects(digests: Mapping[str, str]) -> dict[str, bytes]:
+    """Return the cached object files, by symbol, of functions with these digests."""
+    objects = {}
     for folder in cache_folders():
         for symbol, (digest, code) in _read(folder / file_name()).items():
-            if wanted.get(symbol) == digest:
-                found[symbol] = code
-    return found
+            if digests.get(symbol) == digest:
+                objects[symbol] = code
+    return objects
 
 
-def _read(path: Path) -> Kept:
-    """What a file holds, nothing if it is none of ours or damaged."""
+def _read(path: Path) -> StoredObjects:
+    """Return the content of a file, nothing if it is damaged or of another kind."""
     try:
         content = path.read_bytes()
     except OSError:
@@ -95,8 +95,8 @@ def _read(path: Path) -> Kept:
     return pickle.loads(rest) if header == _hash(rest) else {}
 
 
-def keep(functions: Kept) -> Path | None:
-    """Put functions in the file, beside the others that are there; the path, None where nothing can be written."""
+def store_objects(functions: StoredObjects) -> Path | None:
+    """Add functions to the file; return its path, None where no folder can be written to."""
     folder = writable_folder()
     if folder is None:
         return None

@@ -1,4 +1,4 @@
-"""Machine code without its compiler: LLVM's modules to the code of object files, and object files to addresses."""
+"""Machine code: from LLVM modules to object files, and from object files to addresses."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from multiphi_exudyn.errors import MultiPhiTypeError
 
 __all__ = ["RAISED", "load", "object_code", "refusal", "this_cpu"]
 
-RAISED = "multiphi_exudyn.raised"  # what a function would call that raises an error
-IN_NUMBA = ("numba_", "NRT_", "Py", RAISED)  # beginnings of what is in numba, in Python, or nowhere
-OF_C = {"numba_ldexp": "ldexp", "numba_frexp": "frexp"}  # what numba has of C's, under a name of its own
+RAISED = "multiphi_exudyn.raised"  # symbol that a function calls to raise an error
+IN_NUMBA = ("numba_", "NRT_", "Py", RAISED)  # prefixes of symbols of numba, of Python, or undefined ones
+OF_C = {"numba_ldexp": "ldexp", "numba_frexp": "frexp"}  # C functions under numba's names
 LEVEL = 1  # of optimisation: more takes longer, and gains nothing
 
 
@@ -28,24 +28,24 @@ def _target() -> llvm.Target:
 
 
 def this_cpu() -> tuple[str, str, str]:
-    """Kind of machine, name of the processor and its features."""
+    """Return the kind of machine, the name of the processor and its features."""
     return llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
 
 
 def _machine(cpu: str, features: str) -> llvm.TargetMachine:
-    """What emits code for a processor, set as numba sets it: code that stays in the process."""
+    """Return a code emitter for a processor, with numba's settings for code that stays in the process."""
     reloc = "static" if _target().name.startswith("x86") else "default"
     return _target().create_target_machine(cpu, features, opt=3, reloc=reloc, codemodel="jitdefault", jit=True)
 
 
-_emitter = functools.cache(_machine)  # for all functions; one that loads is given away
+_emitter = functools.cache(_machine)  # shared by all functions; a loading engine owns its machine
 
 
 def object_code(module: llvm.ModuleRef, symbol: str, cpu: str, features: str) -> bytes:
-    """The object file of a module in which ``symbol`` is the function that others call.
+    """Return the object file of a module with the public function ``symbol``.
 
-    That one calls RAISED after an error. As nothing may raise, this has to vanish with all that could, and the code
-    needs nothing but the C library and the functions it calls.
+    The function calls RAISED after an error. Optimisation has to remove this call, as no error is possible; then the
+    code needs only the C library and the functions that it calls.
     """
     machine = _emitter(cpu, features)
     for function in module.functions:
@@ -63,7 +63,7 @@ def object_code(module: llvm.ModuleRef, symbol: str, cpu: str, features: str) ->
 
 
 def refusal(symbol: str) -> MultiPhiTypeError:
-    """What is told of a function that cannot be compiled."""
+    """Return the error for a function that cannot be compiled."""
     return MultiPhiTypeError(
         f"{symbol}: got an operation that raises an error or is numba's own, need none (a complex number divided "
         "or to a power, int ** int, a range with a variable step, arrays, lists and gamma are)"
@@ -71,7 +71,7 @@ def refusal(symbol: str) -> MultiPhiTypeError:
 
 
 def load(objects: Iterable[bytes], symbol: str) -> tuple[int, llvm.ExecutionEngine]:
-    """(address of a function, what keeps it there) of object files that call one another."""
+    """Return the address of a function of object files that call one another, and the engine that owns its code."""
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine("", ""))
     for each in objects:
         engine.add_object_file(llvm.ObjectFileRef.from_data(each))

@@ -1,7 +1,7 @@
-"""Functions on flat buffers as numba writes them for LLVM.
+"""Translation of functions on flat buffers to LLVM by numba.
 
-numba reads Python's code and finds the types; of its passes those are run that scalars and buffers need. A variable has
-one type in all of its function. Functions call one another by their symbols, as C does.
+numba reads Python's bytecode and infers the types; only the passes that scalars and buffers need are run. A variable
+has one type in the whole function. Functions call one another by their symbols, as C does.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from multiphi_exudyn.mathematics.compiling.buffer_function import (
 )
 from multiphi_exudyn.mathematics.compiling.machine_code import RAISED, object_code, refusal
 
-__all__ = ["translated"]
+__all__ = ["object_file_of"]
 
 KINDS = {
     Ints: numba.types.CPointer(numba.types.int64),
@@ -52,8 +52,8 @@ KINDS = {
 }
 
 
-def translated(function: FunctionType) -> bytes:
-    """The object file of a function."""
+def object_file_of(function: FunctionType) -> bytes:
+    """Return the object file of a function."""
     target = cpu_target.target_context
     library = _Library(target.codegen(), symbol(function))
     with global_compiler_lock:
@@ -63,7 +63,7 @@ def translated(function: FunctionType) -> bytes:
 
 
 def _write(function: FunctionType, library: _Library) -> None:
-    """Put a function in a library, for C to call."""
+    """Add a function to a library, callable from C."""
     called = {name: _external(callee) for name, callee in callees(function).items()}
     alone = FunctionType(function.__code__, {**function.__globals__, **called}, function.__name__)
     kinds = _types(function)
@@ -78,21 +78,21 @@ def _write(function: FunctionType, library: _Library) -> None:
 
 
 class _Library(JITCodeLibrary):
-    """What numba writes for LLVM, and would else optimise twice and load."""
+    """Library of LLVM modules that are neither optimised twice nor loaded, unlike numba's own."""
 
     def add_ir_module(self, ir_module: ir.Module) -> None:
-        """Take what has been written."""
+        """Link a module into the library."""
         self._final_module.link_in(llvm.parse_assembly(str(ir_module)))
 
     def linked(self) -> llvm.ModuleRef:
-        """All of it, with the functions of numba's own that it calls."""
+        """Return the module, with the numba functions that it calls."""
         for library in self._linking_libraries:
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
         return self._final_module
 
 
 class _Types(Context):
-    """numba's types of operations, each found once: it tries all that it knows whenever it is asked."""
+    """numba's types of operations, cached: numba would try all candidates for every request."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -100,16 +100,16 @@ class _Types(Context):
         self._operators: dict[tuple[Any, Any], Any] = {}
 
     def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
-        """The signature of a function for arguments of these types."""
+        """Return the signature of a function for arguments of these types."""
         if kws or (func, args) not in self._found:
             self._found[func, args] = super().resolve_function_type(func, args, kws)
         return self._found[func, args]
 
     def operator(self, op: Any, args: Any) -> Any:
-        """An operator for arguments of these types."""
+        """Return an operator for arguments of these types."""
         if (op, args) not in self._operators:
-            self._operators[op, args] = found = self.resolve_value_type(op)
-            found.get_call_type(self, args, {})  # which it then knows how to write
+            self._operators[op, args] = function = self.resolve_value_type(op)
+            function.get_call_type(self, args, {})  # registers its implementation
         return self._operators[op, args]
 
 
@@ -123,19 +123,19 @@ class _Constants(FunctionPass):
         FunctionPass.__init__(self)
 
     def run_pass(self, state: Any) -> bool:
-        """In every block, whose statements follow one another."""
+        """Replace numbers of the module by constants in every block."""
         for block in state.func_ir.blocks.values():
-            known = dict[str, float]()
+            numbers = dict[str, float]()
             for assignment in block.find_insts(statements.Assign):
-                number = _number(assignment.value, known)
-                if number is not None:  # then it is a temporary, which is assigned once; variables are copies of these
-                    known[assignment.target.name] = number
+                number = _number(assignment.value, numbers)
+                if number is not None:  # a temporary, assigned once; variables are copies of temporaries
+                    numbers[assignment.target.name] = number
                     assignment.value = statements.Const(number, assignment.loc)
         return True
 
 
 def _number(value: Any, known: Mapping[str, float]) -> float | None:
-    """The number that a value is, of temporaries that are ``known``, or None."""
+    """Return the number of a value, from ``known`` temporaries, or None."""
     if isinstance(value, statements.Global | statements.Const):
         return value.value if type(value.value) in (int, float) else None
     if isinstance(value, statements.Expr) and value.op == "binop" and value.fn is operator.add:
@@ -145,19 +145,19 @@ def _number(value: Any, known: Mapping[str, float]) -> float | None:
 
 
 class _Lowering(Lower):
-    """What numba writes for LLVM, but for what objects need: counts of references, and errors anywhere.
+    """numba's lowering to LLVM without reference counts and errors, which only objects need.
 
-    The types of operators are known by now; numba would find them once more.
+    The types of operators are taken from the cache; numba would infer them again.
     """
 
     def lower(self) -> None:
-        """The function as numba calls it, and as C does."""
+        """Write the function for numba's and for C's calling convention."""
         self.lower_normal_function(self.fndesc)
         _add_c_function(self.module, self.fndesc, self.library.name)
         self.library.add_ir_module(self.module)
 
     def lower_block(self, block: Any) -> None:
-        """One block of statements."""
+        """Lower one block of statements."""
         self.pre_block(block)
         for statement in block.body:
             self.loc = statement.loc
@@ -165,7 +165,7 @@ class _Lowering(Lower):
         self.post_block(block)
 
     def lower_inst(self, inst: Any) -> None:
-        """One statement."""
+        """Lower one statement."""
         if not isinstance(inst, statements.Assign):
             super().lower_inst(inst)
             return
@@ -180,23 +180,23 @@ class _Lowering(Lower):
             self.builder.store(value, self.getvar(name))
 
     def alloca(self, name: str, type: Any) -> Any:
-        """Where a variable stands."""
+        """Allocate a variable."""
         return cgutils.alloca_once(self.builder, self.context.get_value_type(type), name=name)
 
     def lower_binop(self, resty: Any, expr: Any, op: Any) -> Any:
-        """Two numbers made one."""
+        """Lower an operation of two numbers."""
         kind, context = self.fndesc.calltypes[expr], self.context
         numbers = [
-            context.cast(self.builder, self.loadvar(side.name), self.typeof(side.name), wanted)
-            for side, wanted in zip((expr.lhs, expr.rhs), kind.args, strict=True)
+            context.cast(self.builder, self.loadvar(side.name), self.typeof(side.name), type_)
+            for side, type_ in zip((expr.lhs, expr.rhs), kind.args, strict=True)
         ]
-        found = context.get_function(_known_types().operator(op, kind.args), kind)(self.builder, numbers)
-        return context.cast(self.builder, found, kind.return_type, resty)
+        result = context.get_function(_known_types().operator(op, kind.args), kind)(self.builder, numbers)
+        return context.cast(self.builder, result, kind.return_type, resty)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _Writing(NativeLowering):
-    """Numba's pass that writes for LLVM."""
+    """numba's lowering pass."""
 
     _name = "buffers"
     lowering_class = _Lowering
@@ -206,7 +206,7 @@ PASSES = TranslateByteCode, FixupArgs, _Constants, NopythonTypeInference, _Writi
 
 
 class _Passes(PassManager):
-    """Some of numba's thirty passes, which leave the order of statements as it was."""
+    """A few of numba's thirty passes, which keep the order of statements."""
 
     _ENFORCING = False
 
@@ -218,10 +218,10 @@ class _Passes(PassManager):
 
 
 class _Reading(CompilerBase):
-    """What numba has to do where there are scalars and buffers alone; it looks for much else otherwise."""
+    """numba's compiler with the passes for scalars and buffers only."""
 
     def define_pipelines(self) -> list[PassManager]:
-        """From Python's code to types and to what LLVM reads."""
+        """Return the passes from bytecode to types and LLVM."""
         return [_Passes()]
 
 
@@ -231,7 +231,7 @@ def _known_types() -> _Types:
 
 
 def _add_c_function(module: ir.Module, inner: Any, name: str) -> None:
-    """Put the function ``inner`` there as C calls it; numba's own returns whether there was an error."""
+    """Add a C function that calls ``inner``, whose own convention returns an error status."""
     target = cpu_target.target_context
     kinds = [target.get_value_type(kind) for kind in inner.argtypes]
     outer = ir.Function(module, ir.FunctionType(target.get_value_type(inner.restype), kinds), name)
@@ -244,11 +244,11 @@ def _add_c_function(module: ir.Module, inner: Any, name: str) -> None:
 
 
 def _external(callee: FunctionType) -> Any:
-    """A function to be found by its symbol."""
+    """Return an external function, found by its symbol."""
     return numba.types.ExternalFunction(symbol(callee), _types(callee))
 
 
 def _types(function: FunctionType) -> Any:
-    """A signature in numba's types."""
+    """Return a signature in numba's types."""
     arguments, result = signature(function)
     return KINDS[result](*(KINDS[kind] for kind in arguments))

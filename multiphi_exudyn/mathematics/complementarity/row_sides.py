@@ -1,4 +1,4 @@
-"""Sides of the rows of a complementarity problem: which are violated, who is driven, who changes sides on the way."""
+"""Sides of the rows of a complementarity problem: violated rows, the row to drive, and the next change of a side."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ from multiphi_exudyn.mathematics.complementarity.free_rows import (
     CHANGED_TO,
     CHANGING,
     COUNT,
+    DIRECTION,
     FREE_COUNT,
     HIGHS,
-    LACKING,
     LEADERS,
-    LEFT,
     LENGTHS,
     LOWS,
     MOVES,
@@ -25,6 +24,7 @@ from multiphi_exudyn.mathematics.complementarity.free_rows import (
     PUSH_UNITS,
     PUSHES,
     RATIOS,
+    REMAINDER,
     RESULTS,
     ROWS,
     SHARES,
@@ -37,25 +37,25 @@ from multiphi_exudyn.mathematics.complementarity.free_rows import (
     UNITS,
     UNKNOWNS,
     VALUES,
+    VIOLATIONS,
     WAITING,
-    WAY,
     X,
+    add_free_row,
     bound,
     factor,
-    free_row,
-    leave,
     norm,
     product,
+    project_out,
 )
 from multiphi_exudyn.mathematics.complementarity.least_distance import ALIKE, FOLLOWING, INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import ZERO
 
-__all__ = ["choose_sides", "first_change", "is_met", "look", "most_lacking", "scale"]
+__all__ = ["accept_dependent_row", "choose_sides", "first_change", "most_violated_row", "scale", "update_violations"]
 
 
 @compiled
 def scale(ints: Ints, numbers: Numbers, problem: int) -> None:
-    """Rows of A and G of length one, and all else to that scale; every z zero, or the bound next to it."""
+    """Scale the rows of A and G to length one, and all else accordingly; set every z to zero or its nearest bound."""
     r, leaders, same = ints[problem + UNKNOWNS], ints[problem + LEADERS], ints[problem + ROWS] == ints[problem + PUSHES]
     for k in range(ints[problem + COUNT]):
         same = same and ints[leaders + k] < 0
@@ -86,7 +86,7 @@ def scale(ints: Ints, numbers: Numbers, problem: int) -> None:
 
 @compiled
 def scale_rows(ints: Ints, numbers: Numbers, problem: int, given: int, units: int, lengths: int) -> None:
-    """Rows (k, stride) as rows of length one (k, r), and their lengths, 1 for none."""
+    """Set rows of length one (k, r) from rows (k, stride), and their lengths, 1 for a zero row."""
     r = ints[problem + UNKNOWNS]
     for k in range(ints[problem + COUNT]):
         row = ints[problem + given] + k * ints[problem + STRIDE]
@@ -98,8 +98,8 @@ def scale_rows(ints: Ints, numbers: Numbers, problem: int, given: int, units: in
 
 
 @compiled
-def look(ints: Ints, numbers: Numbers, problem: int) -> None:
-    """RESULTS: w (k,); LACKING: by how much rows that are not free violate their side, zero where it is round-off."""
+def update_violations(ints: Ints, numbers: Numbers, problem: int) -> None:
+    """Set RESULTS, w (k,), and VIOLATIONS (k,) of the sides of rows that are not free, zero where it is round-off."""
     r, x, reach = (
         ints[problem + UNKNOWNS],
         ints[problem + X],
@@ -110,106 +110,106 @@ def look(ints: Ints, numbers: Numbers, problem: int) -> None:
         for i in range(r):
             w += numbers[ints[problem + UNITS] + k * r + i] * numbers[x + i]
         numbers[ints[problem + RESULTS] + k] = w
-        lacking = abs(w) if side == WAITING else side * w
-        if lacking <= numbers[ints[problem + SLACKS] + k] * (numbers[ints[problem + TERMS] + k] + reach):
-            lacking = 0.0
-        wide = side != BETWEEN and is_wide(ints, numbers, problem, k) == 1
-        numbers[ints[problem + LACKING] + k] = lacking if wide else 0.0
+        violation = abs(w) if side == WAITING else side * w
+        if violation <= numbers[ints[problem + SLACKS] + k] * (numbers[ints[problem + TERMS] + k] + reach):
+            violation = 0.0
+        wide = side != BETWEEN and has_range(ints, numbers, problem, k) == 1
+        numbers[ints[problem + VIOLATIONS] + k] = violation if wide else 0.0
 
 
 @compiled
-def most_lacking(ints: Ints, numbers: Numbers, problem: int, in_turn: int) -> int:
-    """The first row of those that are violated most, to round-off, or at all (in_turn 1); -1 where none is."""
-    lacking, largest = ints[problem + LACKING], 0.0
+def most_violated_row(ints: Ints, numbers: Numbers, problem: int, in_turn: int) -> int:
+    """Return the first of the most violated rows, to round-off, or of all violated ones (in_turn 1); -1 for none."""
+    violations, largest = ints[problem + VIOLATIONS], 0.0
     for k in range(ints[problem + COUNT]):
-        largest = max(largest, numbers[lacking + k])
+        largest = max(largest, numbers[violations + k])
     for k in range(ints[problem + COUNT]):
         least = 0.0 if in_turn == 1 else (1.0 - ALIKE) * largest
-        if numbers[lacking + k] > 0.0 and numbers[lacking + k] >= least:
+        if numbers[violations + k] > 0.0 and numbers[violations + k] >= least:
             return k
     return -1
 
 
 @compiled
 def choose_sides(ints: Ints, numbers: Numbers, problem: int, leader: int) -> None:
-    """Rows tied to a leader that leaves zero come to the side to which their w calls them, to none where it is zero."""
+    """Set the sides of rows tied to a leader that leaves zero, by the sign of their w; zero w makes them free."""
     reach = norm(numbers, ints[problem + X], ints[problem + UNKNOWNS])
     for k in range(ints[problem + COUNT]):
-        if ints[ints[problem + LEADERS] + k] == leader and is_wide(ints, numbers, problem, k) == 0:
+        if ints[ints[problem + LEADERS] + k] == leader and has_range(ints, numbers, problem, k) == 0:
             w, terms = numbers[ints[problem + RESULTS] + k], numbers[ints[problem + TERMS] + k] + reach
             ints[ints[problem + SIDES] + k] = BELOW if w > 0.0 else ABOVE
-            if abs(w) <= numbers[ints[problem + SLACKS] + k] * terms and is_apart(ints, numbers, problem, k) == 1:
-                free_row(ints, problem, k)
+            if abs(w) <= numbers[ints[problem + SLACKS] + k] * terms and is_independent(ints, numbers, problem, k) == 1:
+                add_free_row(ints, problem, k)
 
 
 @compiled
-def is_apart(ints: Ints, numbers: Numbers, problem: int, row: int) -> int:
-    """1 where a row does not follow from the free ones."""
-    r, found, left = ints[problem + UNKNOWNS], ints[problem + FREE_COUNT], ints[problem + LEFT]
+def is_independent(ints: Ints, numbers: Numbers, problem: int, row: int) -> int:
+    """Return 1 where a row is linearly independent of the free ones."""
+    r, size, remainder = ints[problem + UNKNOWNS], ints[problem + FREE_COUNT], ints[problem + REMAINDER]
     factor(ints, numbers, problem)
     for i in range(r):
-        numbers[left + i] = numbers[ints[problem + UNITS] + row * r + i]
-    leave(ints, numbers, problem, left, -1)
-    return 1 if found < r and norm(numbers, left, r) > INDEPENDENT else 0
+        numbers[remainder + i] = numbers[ints[problem + UNITS] + row * r + i]
+    project_out(ints, numbers, problem, remainder, -1)
+    return 1 if size < r and norm(numbers, remainder, r) > INDEPENDENT else 0
 
 
 @compiled
-def first_change(ints: Ints, numbers: Numbers, problem: int, driven: int, whole: float) -> float:
-    """How far the driven row goes until a row changes sides, CHANGING, to CHANGED_TO: itself where its w is zero.
+def first_change(ints: Ints, numbers: Numbers, problem: int, driven: int, limit: float) -> float:
+    """Return how far the driven row moves until a row, CHANGING, changes its side to CHANGED_TO; itself at zero w.
 
-    Those that come to zero with it, as rows of its own direction do, stay where they are.
+    Rows that reach zero together with it, as parallel rows do, keep their sides.
     """
-    r, shares, way = ints[problem + UNKNOWNS], ints[problem + SHARES], ints[problem + WAY]
-    until, least = whole, INDEPENDENT * norm(numbers, way, r)
+    r, shares, way = ints[problem + UNKNOWNS], ints[problem + SHARES], ints[problem + DIRECTION]
+    distance, least = limit, INDEPENDENT * norm(numbers, way, r)
     ints[problem + CHANGING] = driven
     ints[problem + CHANGED_TO] = BETWEEN
     for k in range(ints[problem + COUNT]):
         side, leader = ints[ints[problem + SIDES] + k], ints[ints[problem + LEADERS] + k]
-        led = leader >= 0 and (leader == driven or ints[ints[problem + SIDES] + leader] == BETWEEN)
+        is_led = leader >= 0 and (leader == driven or ints[ints[problem + SIDES] + leader] == BETWEEN)
         if k == driven or side == BETWEEN:
             for s in range(BELOW, ABOVE + 1, 2):
                 closing = s * numbers[ints[problem + MOVES] + k]
-                if led:
+                if is_led:
                     closing -= numbers[ints[problem + RATIOS] + k] * numbers[ints[problem + MOVES] + leader]
                 room = s * (bound(ints, numbers, problem, k, s) - numbers[shares + k])
-                if closing > 0.0 and max(room, 0.0) / closing < until:
-                    until = max(room, 0.0) / closing
+                if closing > 0.0 and max(room, 0.0) / closing < distance:
+                    distance = max(room, 0.0) / closing
                     ints[problem + CHANGING] = k
                     ints[problem + CHANGED_TO] = s
         elif (
             side != WAITING
-            and numbers[ints[problem + LACKING] + k] == 0.0
-            and (led or is_wide(ints, numbers, problem, k) == 1)
+            and numbers[ints[problem + VIOLATIONS] + k] == 0.0
+            and (is_led or has_range(ints, numbers, problem, k) == 1)
         ):
             closing = side * product(numbers, ints[problem + UNITS] + k * r, way, r)
             room = max(-side * numbers[ints[problem + RESULTS] + k], 0.0)
-            if closing > least and room / closing < min(until, (1.0 - ALIKE) * whole):
-                until = room / closing
+            if closing > least and room / closing < min(distance, (1.0 - ALIKE) * limit):
+                distance = room / closing
                 ints[problem + CHANGING] = k
                 ints[problem + CHANGED_TO] = BETWEEN
-    return until
+    return distance
 
 
 @compiled
-def is_wide(ints: Ints, numbers: Numbers, problem: int, row: int) -> int:
-    """1 where there is something between a row's bounds."""
+def has_range(ints: Ints, numbers: Numbers, problem: int, row: int) -> int:
+    """Return 1 where the bounds of a row differ."""
     return 1 if bound(ints, numbers, problem, row, BELOW) < bound(ints, numbers, problem, row, ABOVE) else 0
 
 
 @compiled
-def is_met(ints: Ints, numbers: Numbers, problem: int, row: int, step: float) -> int:
-    """1 where a row lacks no more beside those that it follows from than what is left of it beside them may make.
+def accept_dependent_row(ints: Ints, numbers: Numbers, problem: int, row: int, step: float) -> int:
+    """Accept a row that depends on the free ones if its violation is as small as its remainder allows; 1 if so.
 
-    Unless it can take over from one of them what they bear, in a step that is not far larger than that.
+    It is not accepted where it can take over the share of one of them in a step of comparable size.
     """
-    x, slack, borne = ints[problem + X], ints[problem + SLACKS] + row, 0.0
+    x, slack, total = ints[problem + X], ints[problem + SLACKS] + row, 0.0
     terms = numbers[ints[problem + TERMS] + row] + norm(numbers, x, ints[problem + UNKNOWNS])
-    if numbers[ints[problem + LACKING] + row] > FOLLOWING * terms:
+    if numbers[ints[problem + VIOLATIONS] + row] > FOLLOWING * terms:
         return 0
     for k in range(ints[problem + COUNT]):
-        borne += abs(numbers[ints[problem + SHARES] + k])
-    if numbers[ints[problem + LACKING] + row] > 0.0 and step <= 2.0 * borne:
+        total += abs(numbers[ints[problem + SHARES] + k])
+    if numbers[ints[problem + VIOLATIONS] + row] > 0.0 and step <= 2.0 * total:
         return 0
     numbers[slack] = FOLLOWING
-    numbers[ints[problem + LACKING] + row] = 0.0
+    numbers[ints[problem + VIOLATIONS] + row] = 0.0
     return 1

@@ -11,13 +11,13 @@ import scipy.sparse.linalg
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.mathematics.eigenproblems.modes import NEAR, ROUND_OFF
 
-__all__ = ["check_mass", "definite_factor", "iterated", "lanczos"]
+__all__ = ["check_mass", "definite_factor", "lanczos", "lanczos_iteration"]
 
 
 def definite_factor(matrix: Any) -> Any | None:
-    """Sparse triangular factors of a symmetric matrix; None where it is not positive definite to round-off.
+    """Return sparse triangular factors of a symmetric matrix, None where it is not positive definite to round-off.
 
-    Pivots are taken from the diagonal, so that their signs are those of the eigenvalues (Sylvester).
+    Pivots are on the diagonal, so that the numbers of their signs are those of the eigenvalues (Sylvester).
     """
     try:
         factor = scipy.sparse.linalg.splu(
@@ -37,36 +37,36 @@ def check_mass(mass: Any) -> None:
 
 
 def lanczos(
-    mass: Any, stiffness: Any, count: int, shift: float, answer: Any, start: np.ndarray
+    mass: Any, stiffness: Any, count: int, shift: float, solve: Any, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The ``count`` lowest omega^2, ascending, and their shapes, without a cluster that ``count`` would part.
+    """Return the ``count`` lowest omega^2, ascending, and their shapes, without a cluster that ``count`` would part.
 
-    answer: to a force, A^-1, or what other modes leave of it. start: (n,), of the iteration.
+    solve: A^-1 times a vector, or its part beside other modes. start: (n,), of the iteration.
     """
-    values, vectors = iterated(mass, stiffness, count + 1, shift, answer, start)
-    apart = np.flatnonzero(np.diff(values) > NEAR * np.abs(values[1:]))
-    whole = count >= stiffness.shape[0] - 2  # there is no more to part them from
-    kept = count if whole and not apart.size else (apart[-1] + 1 if apart.size else 0)
-    return values[:kept], vectors[:, :kept]
+    values, vectors = lanczos_iteration(mass, stiffness, count + 1, shift, solve, start)
+    gaps = np.flatnonzero(np.diff(values) > NEAR * np.abs(values[1:]))
+    is_complete = count >= stiffness.shape[0] - 2  # no further modes to part them from
+    size = count if is_complete and not gaps.size else (gaps[-1] + 1 if gaps.size else 0)
+    return values[:size], vectors[:, :size]
 
 
-def iterated(
+def lanczos_iteration(
     mass: Any,
     stiffness: Any,
     count: int,
     shift: float,
-    answer: Any,
+    solve: Any,
     start: np.ndarray,
     tolerance: float = 0.0,
     vectors: int | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The ``count`` lowest omega^2 that a Lanczos iteration sees, ascending, and their shapes.
+    """Return the ``count`` lowest omega^2 of a Lanczos iteration, ascending, and their shapes.
 
-    Of modes of one frequency it sees the part of ``start`` (n,) among them; any further one comes of round-off alone.
-    tolerance: of omega^2, zero for round-off. vectors: at a time, None for twice as many as are looked for.
+    Of modes of one frequency it finds the component of ``start`` (n,) in their space; others appear by round-off only.
+    tolerance: of omega^2, zero for round-off. vectors: size of the Krylov space, None for twice ``count``.
     """
     n = stiffness.shape[0]
-    operator = scipy.sparse.linalg.LinearOperator((n, n), answer, dtype=float)
+    operator = scipy.sparse.linalg.LinearOperator((n, n), solve, dtype=float)
     try:
         values, shapes = scipy.sparse.linalg.eigsh(
             stiffness,

@@ -9,8 +9,8 @@ accuracy in all of them. Source: J. Demmel et al., Computing the singular value 
 relative accuracy, Linear Algebra Appl. 299 (1999) 21; Z. Drmac, K. Veselic, SIAM J. Matrix Anal. Appl.
 29 (2008) 1322.
 
-An eigensolver leaves the sign of a mode open, and the basis of what modes of one frequency span; round-off then
-chooses, and it differs between processors. ``turned`` makes both definite.
+The sign of a mode, and the basis of a space of modes of one frequency, are arbitrary: an eigensolver chooses them by
+round-off, which differs between processors. ``aligned_modes`` makes both unique.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ __all__ = [
     "NEAR",
     "ROUND_OFF",
     "Modes",
-    "classified",
+    "aligned_modes",
     "complete_modes",
     "largest_ratio",
+    "modes_from_squares",
     "right_singular_vectors",
     "round_off_energy",
-    "turned",
 ]
 
 ROUND_OFF = 64 * np.finfo(float).eps  # of |phi|^T |K| |phi|: strain energy below it is round-off, not stiffness
 FIRST_SHIFT = 1e-8  # of the largest K_ii / M_ii: regularises K until the first elastic mode is known
 EQUAL = 1e-11  # of omega^2: nearer ones are equal up to the round-off of matrices and eigenvalues
-NEAR = 1e-6  # of omega^2: round-off turns nearer modes into each other by more than 1e-10, so they are kept together
-MOVES = 1e-5  # of what modes can move a row by: with less, the round-off of a mode could choose its sign
-TURNED = 1e-14  # of what a coordinate moves in a cluster: what a rotation leaves of less in one mode is its round-off
+NEAR = 1e-6  # of omega^2: round-off mixes nearer modes by more than 1e-10, so they are kept together
+MOVES = 1e-5  # of the largest value of a row: of smaller values, round-off could choose the sign of a mode
+ROTATED = 1e-14  # of a coordinate's amplitude in a cluster: a smaller value after a rotation is round-off
 
 
 @dataclass(frozen=True)
@@ -63,9 +63,9 @@ class Modes:
         return len(self.omega)
 
     def turned(self, rows: np.ndarray) -> Modes:
-        """The same modes with what an eigensolver leaves open chosen by ``rows`` (k, n), then by the coordinates."""
+        """Return the same modes with signs and bases of clusters chosen by ``rows`` (k, n), then by the coordinates."""
         sizes = np.linalg.norm(np.vstack([rows @ self.shapes, self.shapes]), axis=1)
-        squares, shapes, _ = turned(self.omega**2, self.shapes, rows, sizes)
+        squares, shapes, _ = aligned_modes(self.omega**2, self.shapes, rows, sizes)
         return Modes(np.sqrt(squares), shapes, self.rigid)
 
 
@@ -101,42 +101,42 @@ def right_singular_vectors(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return (values * (work[0] / work[1]))[::-1], vectors[:, ::-1]
 
 
-def turned(
+def aligned_modes(
     squares: np.ndarray, shapes: np.ndarray, rows: np.ndarray, sizes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """omega^2 (m,), modes (n, m) and what rows see of them (k, m), the same on every processor.
+    """Return omega^2 (m,), modes (n, m) and the values of rows in them (k, m), the same on every processor.
 
-    What an eigensolver leaves open are signs, and bases of clusters of equal omega^2. squares: ascending. rows: (k, n),
-    followed by the coordinates themselves. sizes: (k + n,), what modes of unit length can move each of these by. Of a
-    cluster the first row that moves in it sees the first mode only, of the others the first row that moves in one of
-    them sees the first of these only, and so on; its omega^2 become their mean. The first row that moves in a mode
-    moves forward.
+    Signs, and bases of clusters of equal omega^2, are made unique. squares: ascending. rows: (k, n), followed by the
+    coordinates themselves. sizes: (k + n,), their largest values in a mode of unit length. In a cluster the first row
+    with a value has it in the first mode only; among the other modes the first row with a value has it in the first of
+    these only, and so on; the omega^2 are replaced by their mean. The first row with a value in a mode has a positive
+    one.
     """
-    clusters, seen = _clusters(squares), rows @ shapes
+    clusters, values = _clusters(squares), rows @ shapes
     if clusters:
         squares, shapes = squares.copy(), shapes.copy()
     for first, last in clusters:
         squares[first:last] = np.mean(squares[first:last])
-        turn = _turn(np.vstack([seen[:, first:last], shapes[:, first:last]]), sizes)
+        rotation = _alignment(np.vstack([values[:, first:last], shapes[:, first:last]]), sizes)
         lengths = np.linalg.norm(shapes[:, first:last], axis=1, keepdims=True)
-        cluster = shapes[:, first:last] @ turn
-        shapes[:, first:last] = np.where(np.abs(cluster) <= TURNED * lengths, 0.0, cluster)
-        seen[:, first:last] = seen[:, first:last] @ turn
-    signs = _signs(seen, shapes, sizes)
-    return squares, shapes * signs, seen * signs
+        cluster = shapes[:, first:last] @ rotation
+        shapes[:, first:last] = np.where(np.abs(cluster) <= ROTATED * lengths, 0.0, cluster)
+        values[:, first:last] = values[:, first:last] @ rotation
+    signs = _signs(values, shapes, sizes)
+    return squares, shapes * signs, values * signs
 
 
-def _signs(seen: np.ndarray, shapes: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Of every mode the sign (m,) with which the first row or coordinate moves that moves in it."""
-    if len(seen) and (np.abs(seen[0]) > MOVES * sizes[0]).all():
-        return np.copysign(1.0, seen[0])
-    seen = np.vstack([seen, shapes])
-    first = _first_moved(np.abs(seen), sizes[: len(seen), None])
-    return np.where(seen[first, np.arange(seen.shape[1])] >= 0, 1.0, -1.0)
+def _signs(values: np.ndarray, shapes: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Return the sign (m,) of the first row or coordinate that has a value in each mode."""
+    if len(values) and (np.abs(values[0]) > MOVES * sizes[0]).all():
+        return np.copysign(1.0, values[0])
+    values = np.vstack([values, shapes])
+    first = _first_row(np.abs(values), sizes[: len(values), None])
+    return np.where(values[first, np.arange(values.shape[1])] >= 0, 1.0, -1.0)
 
 
 def _clusters(squares: np.ndarray) -> list[tuple[int, int]]:
-    """First and one past the last mode of every cluster of two or more equal omega^2, ascending."""
+    """Return the first and one past the last mode of every cluster of two or more equal omega^2, ascending."""
     steps = enumerate(itertools.pairwise(squares.tolist()), start=1)
     ends = [k for k, (below, above) in steps if above - below > EQUAL * max(abs(below), abs(above))]
     if len(ends) == len(squares) - 1:
@@ -144,30 +144,30 @@ def _clusters(squares: np.ndarray) -> list[tuple[int, int]]:
     return [(first, last) for first, last in itertools.pairwise([0, *ends, len(squares)]) if last - first > 1]
 
 
-def _turn(seen: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Rotation (d, d) of d modes after which each is seen by its own row first; seen: (k, d) of all rows."""
-    turn = np.eye(seen.shape[1])
-    for j in range(len(turn) - 1):
-        left = seen @ turn[:, j:]
-        row = int(_first_moved(np.linalg.norm(left, axis=1), sizes))
-        towards = left[row] / (np.linalg.norm(left[row]) or 1.0)  # the mode that it sees comes first
-        towards[0] += np.copysign(1.0, towards[0])
-        turn[:, j:] -= np.outer(turn[:, j:] @ towards, towards) * (2 / (towards @ towards))
-    return turn
+def _alignment(values: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Return a rotation (d, d) of d modes after which each has its own first row; values: (k, d) of all rows."""
+    rotation = np.eye(values.shape[1])
+    for j in range(len(rotation) - 1):
+        rotated = values @ rotation[:, j:]
+        row = int(_first_row(np.linalg.norm(rotated, axis=1), sizes))
+        reflector = rotated[row] / (np.linalg.norm(rotated[row]) or 1.0)  # its mode comes first
+        reflector[0] += np.copysign(1.0, reflector[0])
+        rotation[:, j:] -= np.outer(rotation[:, j:] @ reflector, reflector) * (2 / (reflector @ reflector))
+    return rotation
 
 
-def _first_moved(moved: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """First row that moves, by ``moved`` (k,) or in every column of (k, m), or else the one nearest to moving."""
-    moves = moved > MOVES * sizes
-    first = moves.argmax(axis=0)
-    if moves.any(axis=0).all():
+def _first_row(values: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Return the first row with a value in (k,) or in each column of (k, m), else the one of largest value."""
+    is_present = values > MOVES * sizes
+    first = is_present.argmax(axis=0)
+    if is_present.any(axis=0).all():
         return np.asarray(first)
-    share = np.divide(moved, sizes, out=np.zeros_like(moved), where=sizes > 0)
-    return np.where(moves.any(axis=0), first, share.argmax(axis=0))
+    share = np.divide(values, sizes, out=np.zeros_like(values), where=sizes > 0)
+    return np.where(is_present.any(axis=0), first, share.argmax(axis=0))
 
 
 def _shifted_modes(mass: np.ndarray, stiffness: np.ndarray, shift: float) -> Modes | None:
-    """Modes by way of K + shift M; None where that is not positive definite."""
+    """Return the modes from K + shift M; None where it is not positive definite."""
     try:
         lower = scipy.linalg.cholesky(mass, lower=True)
     except scipy.linalg.LinAlgError as error:
@@ -179,13 +179,13 @@ def _shifted_modes(mass: np.ndarray, stiffness: np.ndarray, shift: float) -> Mod
     product = scipy.linalg.solve_triangular(lower, upper.T, lower=True).T
     singular, vectors = right_singular_vectors(product)
     shapes = scipy.linalg.solve_triangular(lower, vectors, lower=True, trans="T")
-    return classified(stiffness, singular**2 - shift, shapes, shift)
+    return modes_from_squares(stiffness, singular**2 - shift, shapes, shift)
 
 
-def classified(stiffness: Any, omega_squared: np.ndarray, shapes: np.ndarray, shift: float) -> Modes:
-    """Modes with those of no strain energy named rigid-body modes and given omega = 0.
+def modes_from_squares(stiffness: Any, omega_squared: np.ndarray, shapes: np.ndarray, shift: float) -> Modes:
+    """Return modes from omega^2; those without strain energy become rigid-body modes with omega = 0.
 
-    shift: what has been subtracted to get omega_squared; its round-off is left in it.
+    shift: subtracted before to get omega_squared, which has its round-off.
     """
     rigid = omega_squared <= round_off_energy(stiffness, shapes) + ROUND_OFF * shift
     order = np.argsort(np.where(rigid, 0.0, omega_squared), kind="stable")
@@ -199,4 +199,4 @@ def round_off_energy(stiffness: Any, shapes: np.ndarray) -> np.ndarray:
 
 
 def largest_ratio(mass: Any, stiffness: Any) -> float:
-    return float(np.max(stiffness.diagonal() / mass.diagonal())) or 1.0  # any shift serves where nothing is stiff
+    return float(np.max(stiffness.diagonal() / mass.diagonal())) or 1.0  # any shift is good for zero stiffness

@@ -4,9 +4,9 @@
 
 Pieces are interpolated at Chebyshev points of the second kind, their ends among them, and halved until the interpolant
 agrees with the function at the points midway between, and at samples of the whole interval that are spread unevenly,
-the multiples of the golden ratio: no periodic function hides from them. What is shorter than the gaps between the
-samples, 1.2 / number of them, may not be seen at all. A piece that stays in doubt is searched for a jump or a kink
-(corners.py), and the pieces are made again with that instant as an end.
+the multiples of the golden ratio: no periodic function hides from them. Details shorter than the gaps between the
+samples, 1.2 / number of them, may be missed. A piece that does not converge is searched for a jump or a kink
+(corners.py), and the pieces are built again with that instant as an end.
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice, 2013, ch. 2 and 16; V. T. Sos, On the
 distribution mod 1 of the sequence n alpha, Ann. Univ. Sci. Budapest 1 (1958) 127.
 """
@@ -27,13 +27,13 @@ from multiphi_exudyn.mathematics.functions.corners import INSTANT, corners_in, d
 __all__ = ["DEGREE", "FEW_SAMPLES", "MANY_SAMPLES", "MOST_PIECES", "Function", "Interpolant", "Samples", "interpolated"]
 
 DEGREE = 8  # of the polynomials that stand for smooth functions
-MOST_PIECES = 2**18  # a function that needs more is not smooth at the asked tolerance
+MOST_PIECES = 2**18  # a function that needs more is not smooth at the given tolerance
 FIRST_PIECES = 64  # into which a function's interval is divided before any comparison
-ROUND_OFF = 1e-13  # of the largest value: no interpolant is asked to come closer
-SHORT = 2**-10  # of a first piece: one that is still in doubt may hold a corner
-MOST_CORNERS = 2**12  # looked for at once: where more pieces are in doubt, the function is not resolved yet
-IMPULSE = 1 / MOST_PIECES  # of tolerance times interval: in integral a piece may be off by that, all by no more than it
-PASSES = 8  # in which corners are looked for: in round-off there is always one more
+ROUND_OFF = 1e-13  # of the largest value: least tolerance of an interpolant
+SHORT = 2**-10  # of a first piece: one that has not converged may contain a corner
+MOST_CORNERS = 2**12  # at once: with more pieces that have not converged, the function is not resolved yet
+IMPULSE = 1 / MOST_PIECES  # of tolerance times interval: allowed error of the integral of a piece
+PASSES = 8  # that search corners: round-off would give one more each time
 MANY_SAMPLES = 28657  # of a function that takes many times at once; Fibonacci numbers divide most evenly
 FEW_SAMPLES = 10946  # of one that takes single times, a microsecond or more each
 
@@ -49,25 +49,25 @@ class Samples:
 
     @classmethod
     def of(cls, function: Function, end: float, count: int = MANY_SAMPLES) -> Samples:
-        """So many samples, spread over [0, end] as multiples of the golden ratio."""
+        """Return ``count`` samples, spread over [0, end] as multiples of the golden ratio."""
         times = end * np.sort(np.arange(0.5, count) * ((math.sqrt(5) - 1) / 2) % 1.0)
         return cls(times, function(np.concatenate([times, [0.0, end]]))[:-2])  # at the ends a number is enough
 
     @property
     def largest(self) -> float:
-        """The largest |u|."""
+        """Largest |u|."""
         return float(np.max(np.abs(self.values), initial=0.0))
 
     def errors(self, lefts: np.ndarray, rights: np.ndarray, carriers: np.ndarray, series: np.ndarray) -> np.ndarray:
-        """Largest distance (n,) of the samples from the Chebyshev series of pieces, which do not overlap."""
+        """Return the largest distance (n,) of the samples from the Chebyshev series of pieces, which do not overlap."""
         order, errors = np.argsort(lefts), np.zeros(len(lefts))
         owner = order[np.maximum(np.searchsorted(lefts[order], self.times, side="right") - 1, 0)]
         inside = (self.times >= lefts[owner]) & (self.times < rights[owner])
         owner, t = owner[inside], self.times[inside]
         places = 2 * (t - lefts[owner]) / (rights[owner] - lefts[owner]) - 1
-        found = np.sum(chebyshev.chebvander(places, DEGREE) * series[owner], axis=1)
-        found = found * np.exp(1j * carriers[owner] * (t - lefts[owner]))
-        np.maximum.at(errors, owner, np.abs(found - self.values[inside]))
+        approximated = np.sum(chebyshev.chebvander(places, DEGREE) * series[owner], axis=1)
+        approximated = approximated * np.exp(1j * carriers[owner] * (t - lefts[owner]))
+        np.maximum.at(errors, owner, np.abs(approximated - self.values[inside]))
         return errors
 
 
@@ -87,22 +87,22 @@ class Interpolant:
 def interpolated(
     function: Function, omega: Function, end: float, tolerance: float, samples: Samples, breaks: np.ndarray
 ) -> Interpolant:
-    """A function of (k,) times on [0, end] to ``tolerance``, in units of u, on pieces that ride on omega.
+    """Return the interpolant of a function of (k,) times on [0, end] to ``tolerance``, with carriers omega.
 
-    breaks: corners that are known. Raises NumericalFailure where no so many pieces are enough.
+    breaks: known corners. tolerance: in units of u. Raises NumericalFailure where MOST_PIECES are not enough.
     """
     corners = distinct(breaks, end)
-    for searched in (*[True] * PASSES, False):
-        pieces = _Pieces(function, omega, end, tolerance, samples, corners, searched)
-        found = pieces.halved()
-        if not len(found):
+    for is_searched in (*[True] * PASSES, False):
+        pieces = _Pieces(function, omega, end, tolerance, samples, corners, is_searched)
+        new_corners = pieces.halved()
+        if not len(new_corners):
             break
-        corners = distinct(np.concatenate([corners, found]), end)
+        corners = distinct(np.concatenate([corners, new_corners]), end)
     return pieces.interpolant()
 
 
 class _Pieces:
-    """Pieces on their way to a tolerance, between known corners."""
+    """Pieces between known corners, halved until they have a tolerance."""
 
     def __init__(
         self,
@@ -121,22 +121,22 @@ class _Pieces:
         self._left = 0.0
 
     def halved(self) -> np.ndarray:
-        """Halve pieces until they agree with the function; corners (k,) that were found on the way."""
+        """Halve pieces until they agree with the function; return the corners (k,) found meanwhile."""
         edges = self._first_edges()
-        lefts, rights, count, found = edges[:-1], edges[1:], 0, list[np.ndarray]()
+        lefts, rights, count, corners = edges[:-1], edges[1:], 0, list[np.ndarray]()
         while len(lefts):
             carriers = self._omega((lefts + rights) / 2)
             series, errors = self._fit(lefts, rights, carriers)
-            close, impulses = errors <= self._allowed, errors * (rights - lefts)
-            good = close | (impulses <= IMPULSE * self._allowed * self._end)
-            self._worst = max(self._worst, float(np.max(errors[close], initial=0.0)))
-            self._left += float(np.sum(impulses[good & ~close]))
-            self._done.append(tuple(column[good] for column in (lefts, rights, carriers, series)))
-            count += int(np.sum(good))
-            lefts, rights = lefts[~good], rights[~good]
-            here = self._corners_in(lefts, rights)
-            found.append(here[np.isfinite(here)])
-            lefts, rights = lefts[np.isnan(here)], rights[np.isnan(here)]
+            is_close, impulses = errors <= self._allowed, errors * (rights - lefts)
+            is_good = is_close | (impulses <= IMPULSE * self._allowed * self._end)
+            self._worst = max(self._worst, float(np.max(errors[is_close], initial=0.0)))
+            self._left += float(np.sum(impulses[is_good & ~is_close]))
+            self._done.append(tuple(column[is_good] for column in (lefts, rights, carriers, series)))
+            count += int(np.sum(is_good))
+            lefts, rights = lefts[~is_good], rights[~is_good]
+            new_corners = self._corners_in(lefts, rights)
+            corners.append(new_corners[np.isfinite(new_corners)])
+            lefts, rights = lefts[np.isnan(new_corners)], rights[np.isnan(new_corners)]
             if count + 2 * len(lefts) > MOST_PIECES or np.any(rights - lefts <= INSTANT * self._end):
                 raise NumericalFailure(
                     f"function of time: not smooth enough for a tolerance of {self._tolerance:g} near t = "
@@ -145,7 +145,7 @@ class _Pieces:
                 )
             middles = (lefts + rights) / 2
             lefts, rights = np.concatenate([lefts, middles]), np.concatenate([middles, rights])
-        return np.concatenate(found)
+        return np.concatenate(corners)
 
     def interpolant(self) -> Interpolant:
         """The pieces, once they agree."""
@@ -171,18 +171,18 @@ class _Pieces:
     def _corners_in(self, lefts: np.ndarray, rights: np.ndarray) -> np.ndarray:
         """Corners of the pieces that are short enough to be searched for one, NaN elsewhere."""
         result = np.full(len(lefts), np.nan)
-        short = np.flatnonzero(rights - lefts <= SHORT * self._end / FIRST_PIECES)
-        if self._searched and 0 < len(short) <= MOST_CORNERS:
-            here = corners_in(self._function, lefts[short], rights[short], self._end, self._allowed)
-            known = np.concatenate([[0.0], self._corners, [self._end]])
-            apart = np.min(np.abs(here[:, None] - known), axis=1) > 2 * INSTANT * self._end
-            result[short] = np.where(apart, here, np.nan)
+        indices = np.flatnonzero(rights - lefts <= SHORT * self._end / FIRST_PIECES)
+        if self._searched and 0 < len(indices) <= MOST_CORNERS:
+            corners = corners_in(self._function, lefts[indices], rights[indices], self._end, self._allowed)
+            edges = np.concatenate([[0.0], self._corners, [self._end]])
+            apart = np.min(np.abs(corners[:, None] - edges), axis=1) > 2 * INSTANT * self._end
+            result[indices] = np.where(apart, corners, np.nan)
         return result
 
     def _fit(self, lefts: np.ndarray, rights: np.ndarray, carriers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Chebyshev series (n, D + 1) of every piece on its carrier, its error (n,) midway and at the samples."""
-        own, between, fitted, midway = _nodes()
-        values, checks = (self._sampled(lefts, rights, carriers, places) for places in (own, between))
+        points, between, fitted, midway = _nodes()
+        values, checks = (self._sampled(lefts, rights, carriers, places) for places in (points, between))
         self._size = max(self._size, float(np.max(np.abs(values))))
         series = (values @ fitted.T).astype(complex)
         errors = np.max(np.abs(series @ midway.T - checks), axis=1)
@@ -205,9 +205,9 @@ def _nodes() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Chebyshev points and midway points on [0, 1], values -> Chebyshev series, series -> values midway."""
     angles = np.linspace(math.pi, 0.0, 2 * DEGREE + 1)
     x = np.cos(angles)
-    own, between = x[::2], x[1::2]
-    fitted = np.linalg.inv(chebyshev.chebvander(own, DEGREE))
-    return (own + 1) / 2, (between + 1) / 2, fitted, chebyshev.chebvander(between, DEGREE)
+    points, between = x[::2], x[1::2]
+    fitted = np.linalg.inv(chebyshev.chebvander(points, DEGREE))
+    return (points + 1) / 2, (between + 1) / 2, fitted, chebyshev.chebvander(between, DEGREE)
 
 
 @functools.cache

@@ -2,7 +2,7 @@
 
     u(t) = Re( exp(mu_i s) sum_d a_id s^d ),   s = t - t_i,   on the piece t_i <= t < t_i+1
 
-One form holds everything a load or a moving support does in time: a constant (mu = 0, degree 0), a harmonic
+One form represents all loads and motions of supports in time: a constant (mu = 0, degree 0), a harmonic
 (mu = i omega, degree 0), samples (mu = 0, degree 1), any smooth function (mu = 0, degree DEGREE), and a sweep, whose
 carrier is the frequency in the middle of the piece. The response to a piece is known in closed form
 (forced_response.py). A history is zero before its first and after its last break.
@@ -23,8 +23,8 @@ from multiphi_exudyn.mathematics.functions.interpolation import DEGREE, Function
 
 __all__ = ["Piece", "PiecewiseExponential", "differentiated", "translated"]
 
-JUMP = 1e-6  # of a bound of a history: less is no jump
-PHASE_ROUND_OFF = 2e-15  # of a phase, several roundings: no interpolant is asked to know it better
+JUMP = 1e-6  # of a bound of a history: smaller steps are no jumps
+PHASE_ROUND_OFF = 2e-15  # of a phase, several roundings: least tolerance of its interpolant
 
 
 @dataclass(frozen=True)
@@ -81,32 +81,34 @@ class PiecewiseExponential:
     ) -> PiecewiseExponential:
         """A function of (k,) times on [0, end] to ``tolerance``, in units of u.
 
-        samples: of the function, taken here where there are none. breaks: instants (k,) at which it is not smooth.
+        samples: of the function, None to take them here. breaks: instants (k,) at which it is not smooth.
         """
-        seen = Samples.of(function, end) if samples is None else samples
-        known = np.asarray(breaks, dtype=float)
-        return cls._interpolated(interpolated(function, lambda t: np.zeros_like(t), end, tolerance, seen, known))
+        all_samples = Samples.of(function, end) if samples is None else samples
+        corners = np.asarray(breaks, dtype=float)
+        return cls._interpolated(
+            interpolated(function, lambda t: np.zeros_like(t), end, tolerance, all_samples, corners)
+        )
 
     @classmethod
     def modulated(
         cls, amplitude: Function, phase: Function, omega: Function, end: float, tolerance: float
     ) -> PiecewiseExponential:
-        """u = Re(amplitude(t) exp(i phase(t))) on [0, end], omega the phase's rate, by which the pieces ride.
+        """u = Re(amplitude(t) exp(i phase(t))) on [0, end], omega the rate of the phase, carrier of the pieces.
 
-        After many cycles a phase is known to its round-off only, and no interpolant comes closer.
+        After many cycles the round-off of the phase limits the accuracy.
         """
         ends = np.array([0.0, end])
-        known = PHASE_ROUND_OFF * float(np.max(np.abs(amplitude(ends) * phase(ends))))
+        round_off = PHASE_ROUND_OFF * float(np.max(np.abs(amplitude(ends) * phase(ends))))
         none = Samples(np.zeros(0), np.zeros(0))
 
         def function(t: np.ndarray) -> np.ndarray:
             return np.asarray(amplitude(t) * np.exp(1j * phase(t)))
 
-        return cls._interpolated(interpolated(function, omega, end, max(tolerance, known), none, np.zeros(0)))
+        return cls._interpolated(interpolated(function, omega, end, max(tolerance, round_off), none, np.zeros(0)))
 
     @classmethod
-    def _interpolated(cls, found: Interpolant) -> PiecewiseExponential:
-        return cls(found.edges, 1j * found.carriers, found.coefficients, found.error)
+    def _interpolated(cls, interpolant: Interpolant) -> PiecewiseExponential:
+        return cls(interpolant.edges, 1j * interpolant.carriers, interpolant.coefficients, interpolant.error)
 
     @property
     def pieces(self) -> int:
@@ -115,7 +117,7 @@ class PiecewiseExponential:
 
     @property
     def highest_frequency(self) -> float:
-        """Of its carriers [Hz], and of straight pieces, two of which are a swing."""
+        """Highest frequency [Hz] of the carriers, and of straight pieces, two of which make a period."""
         straight = 0.5 / float(np.min(np.diff(self.breaks))) if self.coefficients.shape[1] == 2 else 0.0
         return max(straight, float(np.max(np.abs(self.rates.imag))) / (2 * math.pi))
 
@@ -137,7 +139,7 @@ class PiecewiseExponential:
 
     @functools.cached_property
     def jumps(self) -> np.ndarray:
-        """u after less u before every break (n + 1,), the first and the last among them; nothing jumps at infinity."""
+        """u after minus u before every break (n + 1,), including the first and last; zero at infinity."""
         ends = np.diff(self.breaks)
         last = np.zeros(self.pieces, complex)
         finite = np.isfinite(ends)
@@ -148,25 +150,25 @@ class PiecewiseExponential:
         return np.append(first, 0.0) - np.concatenate([[0.0], last.real])
 
     def jump_times(self, error: float = 0.0) -> np.ndarray:
-        """The breaks (k,) at which u jumps, by more than interpolation leaves; error: of what u is the derivative of.
+        """Return the breaks (k,) at which u jumps by more than the interpolation error; error: of the integral of u.
 
-        Where a polynomial is off by e on a piece of length w, its derivative is by some 2 D^2 e / w (Markov).
+        Where a polynomial has the error e on a piece of length w, its derivative is by some 2 D^2 e / w (Markov).
         """
         steepness = np.abs(self.rates) + 2 * DEGREE**2 / np.diff(self.breaks)
         beside = np.maximum(np.append(steepness, 0.0), np.insert(steepness, 0, 0.0))
-        left = error * beside if error else self.error
-        return np.asarray(self.breaks[np.abs(self.jumps) > JUMP * self.largest + 4 * left])
+        allowed = error * beside if error else self.error
+        return np.asarray(self.breaks[np.abs(self.jumps) > JUMP * self.largest + 4 * allowed])
 
     @functools.cached_property
     def largest(self) -> float:
-        """A bound of |u|, from the sizes of its terms."""
+        """Bound of |u|, from the sizes of its terms."""
         ends = np.diff(self.breaks)
         degrees = np.arange(self.coefficients.shape[1])
         reach = np.where(degrees > 0, np.where(np.isfinite(ends), ends, 0.0)[:, None] ** degrees, 1.0)
         return float(np.max(np.sum(np.abs(self.coefficients) * reach, axis=1)))
 
     def at(self, t: np.ndarray) -> np.ndarray:
-        """u at times (k,)."""
+        """Return u at times (k,)."""
         i = np.searchsorted(self.breaks, t, side="right") - 1
         inside = (i >= 0) & (i < self.pieces)
         i = np.clip(i, 0, self.pieces - 1)
@@ -178,21 +180,21 @@ class PiecewiseExponential:
 
 
 def differentiated(rate: complex | np.ndarray, coefficients: np.ndarray, unit: float = 1.0) -> np.ndarray:
-    """Time derivative of exp(rate s) sum_d a_d (s / unit)^d, as coefficients (D + 1, ...) of such a sum."""
+    """Return the time derivative of exp(rate s) sum_d a_d (s / unit)^d, as coefficients (D + 1, ...) of such a sum."""
     result = np.asarray(rate * coefficients)
     result[:-1] += (np.arange(1, len(coefficients)) / unit * coefficients[1:].T).T
     return result
 
 
 def translated(rate: complex, coefficients: np.ndarray, delay: float) -> np.ndarray:
-    """exp(rate s) sum_d a_d s^d of coefficients (D + 1, ...), from a later start: s -> s + delay.
+    """Return the coefficients (D + 1, ...) of exp(rate s) sum_d a_d s^d for a later start, s -> s + delay.
 
     By repeated synthetic division.
     """
     if delay == 0:
         return coefficients
-    moved = coefficients * np.exp(rate * delay)
-    for lowest in range(len(moved) - 1):
-        for d in range(len(moved) - 2, lowest - 1, -1):
-            moved[d] += delay * moved[d + 1]
-    return moved
+    shifted = coefficients * np.exp(rate * delay)
+    for lowest in range(len(shifted) - 1):
+        for d in range(len(shifted) - 2, lowest - 1, -1):
+            shifted[d] += delay * shifted[d + 1]
+    return shifted

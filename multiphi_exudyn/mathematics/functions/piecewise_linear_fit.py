@@ -11,13 +11,13 @@ import numpy as np
 
 __all__ = ["MOST_SEGMENTS", "spread", "with_segments"]
 
-MOST_SEGMENTS = 2**10  # a law that needs more is not followed by straight segments
-BALANCED = 1e-3  # of the smallest error that so many segments can have: nearer to it is not sought
-NONE_LEFT = 1e-14  # of the error that is known to do: a smaller one is not sought, the segments are the function
+MOST_SEGMENTS = 2**10  # a law that needs more is refused
+BALANCED = 1e-3  # of the smallest error that so many segments can have: accuracy of the search
+NONE_LEFT = 1e-14  # of an error that is known to suffice: below it the segments are the function itself
 
 
 def spread(sides: list[np.ndarray], values: list[np.ndarray], error: float) -> list[np.ndarray]:
-    """Of every side the samples that are knots, each segment as long as this error [N] allows."""
+    """Return the samples that are knots on every side, each segment as long as this error [N] allows."""
     return [_knots(q, value, error) for q, value in zip(sides, values, strict=True)]
 
 
@@ -39,19 +39,19 @@ def _knots(q: np.ndarray, values: np.ndarray, error: float) -> np.ndarray:
 
 
 def _error(q: np.ndarray, values: np.ndarray, a: int, b: int) -> float:
-    """Largest error [N] of the straight line between samples a and b."""
+    """Return the largest error [N] of the straight line between samples a and b."""
     line = values[a] + (values[b] - values[a]) / (q[b] - q[a]) * (q[a : b + 1] - q[a])
     return float(np.max(np.abs(values[a : b + 1] - line)))
 
 
 def with_segments(sides: list[np.ndarray], values: list[np.ndarray], count: int, error: float) -> list[np.ndarray]:
-    """The knots of at most so many segments with the smallest error [N]; ``error`` is one that they can have."""
+    """Return the knots of at most ``count`` segments with the smallest error [N]; ``error`` is known to suffice."""
     high, low, best = error, 0.0, spread(sides, values, error)
     while high - low > BALANCED * high:
         middle = (low + high) / 2 if low else high / 4  # segments grow with error^-1/2
-        found = spread(sides, values, middle)
-        if sum(len(index) - 1 for index in found) <= count:
-            high, best = middle, found
+        knots = spread(sides, values, middle)
+        if sum(len(index) - 1 for index in knots) <= count:
+            high, best = middle, knots
         else:
             low = middle
         if high <= NONE_LEFT * error:

@@ -1,4 +1,4 @@
-"""Exponentials in flat buffers: what exponentials.py says of a basis, for the loop.
+"""Exponentials in flat buffers: the basis of exponentials.py, for the loop.
 
     phi_j(t) = (t / T)^d_j exp(lambda_j t)
 
@@ -9,9 +9,9 @@ A basis is a record in the ints:
     ints[basis + RATES]    where lambda (p,) begins in the waves, 1/s
     ints[basis + SCALES]   where T [s], the largest |lambda| and the largest Re lambda above zero stand in the numbers
     ints[basis + PURE]     1 where every power is zero
-    ints[basis + ETERNAL]  1 where moreover nothing grows
+    ints[basis + ETERNAL]  1 where also nothing grows
 
-Numbers that overflow are infinite, and what is made of them is not finite; nothing raises.
+Numbers that overflow become infinite, and results that depend on them are not finite; nothing raises.
 """
 
 from __future__ import annotations
@@ -38,32 +38,32 @@ __all__ = [
 
 SIZE, POWERS, RATES, SCALES, PURE, ETERNAL = 0, 1, 2, 3, 4, 5
 BASIS = 6  # ints of the record
-SMALL, LARGE = 1e-280, 1e280  # squares between them have lost no digit
-LARGEST_EXPONENT = 709.0  # exp of more is no finite number
+SMALL, LARGE = 1e-280, 1e280  # squares between them are neither denormal nor infinite
+LARGEST_EXPONENT = 709.0  # exp of a larger number overflows
 
 
 @compiled
 def exponential_size(exponent: float) -> float:
-    """exp, infinite where that is too large for a number."""
+    """Return exp, infinite on overflow."""
     return math.exp(exponent) if exponent < LARGEST_EXPONENT else math.inf
 
 
 @compiled
 def modulus(real: float, imag: float) -> float:
-    """|z|; the square root of its square where that is a number far from zero and infinity."""
+    """Return |z|, without overflow or underflow of its square."""
     square = real * real + imag * imag
     return math.sqrt(square) if SMALL < square < LARGE else math.hypot(real, imag)
 
 
 @compiled
 def magnitude(waves: Waves, at: int) -> float:
-    """|z| of a wave."""
+    """Return |z| of a wave."""
     return modulus(waves[at].real, waves[at].imag)
 
 
 @compiled
 def describe_basis(ints: Ints, numbers: Numbers, waves: Waves, basis: int) -> None:
-    """Fill in what follows from p, d, lambda and T: the largest rates, and whether it is pure and eternal."""
+    """Set what follows from p, d, lambda and T: the largest rates, PURE and ETERNAL."""
     powers, rates, scales = ints[basis + POWERS], ints[basis + RATES], ints[basis + SCALES]
     pure = 1
     fastest = 0.0
@@ -81,7 +81,7 @@ def describe_basis(ints: Ints, numbers: Numbers, waves: Waves, basis: int) -> No
 
 @compiled
 def exponentials(ints: Ints, numbers: Numbers, waves: Waves, basis: int, u: float, t: float, result: int) -> None:
-    """(t / T)^d_j exp(lambda_j u), (p,): phi at t where u = t, else phi up to the factors exp(lambda_j (t - u))."""
+    """Set (t / T)^d_j exp(lambda_j u), (p,): phi at t where u = t, else phi up to the factors exp(lambda_j (t - u))."""
     powers, rates = ints[basis + POWERS], ints[basis + RATES]
     ratio = t / numbers[ints[basis + SCALES]]
     for j in range(ints[basis + SIZE]):
@@ -96,11 +96,11 @@ def exponentials(ints: Ints, numbers: Numbers, waves: Waves, basis: int, u: floa
 
 
 @compiled
-def differentiate(ints: Ints, numbers: Numbers, waves: Waves, basis: int, given: int, result: int) -> None:
-    """Coefficients (p,) of the time derivative of Re sum_j a_j phi_j; ``result`` may be ``given``."""
+def differentiate(ints: Ints, numbers: Numbers, waves: Waves, basis: int, c: int, result: int) -> None:
+    """Set coefficients (p,) of the time derivative of Re sum_j a_j phi_j; ``result`` may be ``c``."""
     powers, rates, unit = ints[basis + POWERS], ints[basis + RATES], numbers[ints[basis + SCALES]]
     for j in range(ints[basis + SIZE]):
-        a = waves[given + j]
+        a = waves[c + j]
         waves[result + j] = a * waves[rates + j]
         if ints[powers + j] > 0:
             waves[result + j - 1] += ints[powers + j] / unit * a

@@ -1,18 +1,18 @@
 """Free response of modal equations that damping or friction couple (free_response.py).
 
-    eta'' + D eta' + S eta = p,   S = diag(omega^2) + what couples places (friction), D and S no symmetric matrices
+    eta'' + D eta' + S eta = p,   S = diag(omega^2) + coupling by friction, D and S not symmetric
 
-The motions are those of z' = A z, z = (|omega| eta_e, eta') with the elastic modes e, every entry of it a velocity,
-whatever the units (motion_parts.py). Zero-frequency modes follow. On those that are damped nothing acts but damping:
-eta_f' is part of z, and eta_f its integral. Those that are not, a, are moved by the others and move none,
+The motions are those of z' = A z, z = (|omega| eta_e, eta') with the elastic modes e, with the unit of a velocity
+(motion_parts.py). Zero-frequency modes are added. Damped ones have no other forces: eta_f' is part of z, and eta_f its
+integral. Undamped ones, a, are driven by the others and drive none,
 
     eta_a'' = R y + p_a,   eta_a = R T^-2 y + a + b t + p_a t^2 / 2
 
-p is constant on zero-frequency modes, and zero on the others. With B the columns of W for eta', it brings the parts to
-y = -T^-1 B p, at which the damped ones of these modes drift.
+p is constant on zero-frequency modes, and zero on the others. With B the columns of W for eta', the parts tend to
+y = -T^-1 B p, with which the damped zero-frequency modes drift.
 
-Of a part y' = lambda y that is slow beside the time that a motion lasts at most, the integral y / lambda would be a
-large term with small differences: q' = y stays a motion of its own, in powers of time.
+Of a part y' = lambda y that is slow compared with the duration of a motion, the integral y / lambda would be a large
+term with small differences: q' = y is kept as a motion of its own, in powers of time.
 """
 
 from __future__ import annotations
@@ -35,53 +35,52 @@ DIAGONAL = 1e-13  # of sqrt(D_ii D_jj): off-diagonal damping below it is round-o
 
 
 def modal_response(
-    squares: np.ndarray, damping: np.ndarray, coupling: np.ndarray | None = None, lasting: float = math.inf
+    squares: np.ndarray, damping: np.ndarray, coupling: np.ndarray | None = None, duration: float = math.inf
 ) -> ModalResponse:
-    """Closed form for omega^2 (r,) [rad2/s2], negative for growing modes, damping D [1/s] and S - diag(omega^2) (r, r).
+    """Return the closed form for omega^2 (r,) [rad2/s2], damping D [1/s] and coupling S - diag(omega^2) (r, r).
 
-    lasting: for motions of that time [s] at most. Raises NumericalFailure where the rates are not told apart by more
-    than round-off.
+    duration: of the longest motion [s]. Raises NumericalFailure where rates are not distinct by more than round-off.
     """
-    alone = coupling is None or not coupling.any()
-    if alone and _uncoupled(damping):
-        return uncoupled(squares, np.diagonal(damping), lasting)
-    found = lightly_damped(squares, damping) if alone else None
-    return found or _coupled(squares, np.diag(squares) + (0.0 if coupling is None else coupling), damping, lasting)
+    is_uncoupled = coupling is None or not coupling.any()
+    if is_uncoupled and _uncoupled(damping):
+        return uncoupled(squares, np.diagonal(damping), duration)
+    response = lightly_damped(squares, damping) if is_uncoupled else None
+    return response or _coupled(squares, np.diag(squares) + (0.0 if coupling is None else coupling), damping, duration)
 
 
 def _uncoupled(damping: np.ndarray) -> bool:
-    """Whether what damping (r, r) has beside its diagonal is round-off."""
-    diagonal, beside = np.abs(damping.diagonal()), np.abs(damping)
-    beside.flat[:: len(beside) + 1] = 0.0
+    """Return whether the off-diagonal elements of damping (r, r) are round-off."""
+    diagonal, others = np.abs(damping.diagonal()), np.abs(damping)
+    others.flat[:: len(others) + 1] = 0.0
     largest = diagonal.max(initial=0.0)
-    if beside.max(initial=0.0) > DIAGONAL * largest:
+    if others.max(initial=0.0) > DIAGONAL * largest:
         return False
     scale = np.sqrt(np.outer(diagonal, diagonal))
-    return bool((beside <= DIAGONAL * np.maximum(scale, largest * DIAGONAL)).all())
+    return bool((others <= DIAGONAL * np.maximum(scale, largest * DIAGONAL)).all())
 
 
-def _coupled(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, lasting: float) -> ModalResponse:
-    own = np.flatnonzero(np.any(stiffness, axis=0) | np.any(damping, axis=0))
-    elastic = own[squares[own] != 0]
+def _coupled(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, duration: float) -> ModalResponse:
+    moving = np.flatnonzero(np.any(stiffness, axis=0) | np.any(damping, axis=0))
+    elastic = moving[squares[moving] != 0]
     scale = np.sqrt(np.abs(squares[elastic]))
-    upper = scale[:, None] * (elastic[:, None] == own)
-    lower = -stiffness[np.ix_(own, elastic)] / scale
-    system = np.block([[np.zeros((len(elastic),) * 2), upper], [lower, -damping[np.ix_(own, own)]]])
+    upper = scale[:, None] * (elastic[:, None] == moving)
+    lower = -stiffness[np.ix_(moving, elastic)] / scale
+    system = np.block([[np.zeros((len(elastic),) * 2), upper], [lower, -damping[np.ix_(moving, moving)]]])
     parts, r, e = parts_of(system), len(squares), len(elastic)
     shapes, speeds = np.zeros((2, r, len(parts.rates)), complex)
     maps = np.zeros((2, len(parts.rates), r), complex)
-    shapes[elastic], speeds[own] = parts.vectors[:e] / scale[:, None], parts.vectors[e:]
-    maps[0][:, elastic], maps[1][:, own] = parts.inverse[:, :e] * scale, parts.inverse[:, e:]
-    free, alone = own[squares[own] == 0], np.setdiff1d(np.arange(r), own)
+    shapes[elastic], speeds[moving] = parts.vectors[:e] / scale[:, None], parts.vectors[e:]
+    maps[0][:, elastic], maps[1][:, moving] = parts.inverse[:, :e] * scale, parts.inverse[:, e:]
+    free, alone = moving[squares[moving] == 0], np.setdiff1d(np.arange(r), moving)
     driven = -(stiffness[alone] @ shapes + damping[alone] @ speeds)
-    slow = _slow(parts, speeds[free], driven, lasting)
+    slow = _slow(parts, speeds[free], driven, duration)
     if not slow.any():
         return _of_parts(parts, shapes, speeds, maps, driven, stiffness, damping, free, alone)
-    given, fast = (shapes[:, slow], speeds[:, slow], maps[:, slow]), ~slow
-    still = np.zeros((len(alone), int(fast.sum())))
-    others = parts.only(fast), shapes[:, fast], speeds[:, fast], maps[:, fast], still
-    beside = _slow_motion(parts.rates[slow], *given, free, lasting)
-    return _joined(_of_parts(*others, stiffness, damping, free, alone), beside)
+    slow_columns, fast = (shapes[:, slow], speeds[:, slow], maps[:, slow]), ~slow
+    zero = np.zeros((len(alone), int(fast.sum())))
+    fast_columns = parts.only(fast), shapes[:, fast], speeds[:, fast], maps[:, fast], zero
+    slow_motion = _slow_motion(parts.rates[slow], *slow_columns, free, duration)
+    return _sum(_of_parts(*fast_columns, stiffness, damping, free, alone), slow_motion)
 
 
 def _of_parts(
@@ -95,73 +94,82 @@ def _of_parts(
     free: np.ndarray,
     alone: np.ndarray,
 ) -> ModalResponse:
-    """What moves by the parts, and what the zero-frequency modes have beside; shapes (r, k) of elastic modes so far."""
+    """Return the motion of the parts and of zero-frequency modes; shapes (r, k) are set for elastic modes before."""
     if len(free):
-        shapes[free] = _integrated(speeds[free], parts)
+        shapes[free] = _integral(speeds[free], parts)
     if np.any(driven):
-        shapes[alone] = _integrated(_integrated(driven, parts), parts)
-    response = _joined(_moving(parts, shapes, maps), _following(parts, shapes, maps, free, alone))
+        shapes[alone] = _integral(_integral(driven, parts), parts)
+    response = _sum(_motion_of_parts(parts, shapes, maps), _initial_drift(parts, shapes, maps, free, alone))
     if not len(free):
         return response
     return _with_drift(response, parts, shapes, speeds, maps, stiffness, damping, free, alone)
 
 
-def _slow(parts: Parts, speeds: np.ndarray, driven: np.ndarray, lasting: float) -> np.ndarray:
-    """Which components (k,) are slow; none where none moves damped zero-frequency modes, by the speeds (f, k).
+def _slow(parts: Parts, speeds: np.ndarray, driven: np.ndarray, duration: float) -> np.ndarray:
+    """Return which components (k,) are slow; none if the speeds (f, k) of damped zero-frequency modes are zero.
 
-    driven: accelerations (a, k) of modes that others drive; where there are any, all is integrated as it is.
+    driven: accelerations (a, k) of driven modes; if there are any, no component is treated as slow.
     """
-    found = np.zeros(len(parts.rates), bool)
+    is_slow_component = np.zeros(len(parts.rates), bool)
     if not np.any(driven) and np.any(speeds):
         for first, end in parts.groups:
-            found[first] = end - first == 1 and bool(is_slow(parts.rates[first], lasting))
-    return found
+            is_slow_component[first] = end - first == 1 and bool(is_slow(parts.rates[first], duration))
+    return is_slow_component
 
 
 def _slow_motion(
-    rates: np.ndarray, shapes: np.ndarray, speeds: np.ndarray, maps: np.ndarray, free: np.ndarray, lasting: float
+    rates: np.ndarray, shapes: np.ndarray, speeds: np.ndarray, maps: np.ndarray, free: np.ndarray, duration: float
 ) -> ModalResponse:
-    """What moves by slow parts (s,): V y, on zero-frequency modes X q, q' = y, y' = lambda y + p; by powers of time.
+    """Return the motion of slow parts (s,) in powers of time: V y, X q on free modes, q' = y, y' = lambda y + p.
 
-    q = y(0) t + ..., y = y(0) + ... and what follows is a exp(lambda t) integrated twice and once, a = lambda y(0) + p.
-    shapes, speeds (r, s): V of elastic modes, and eta', X of the others. maps (2, s, r): y(0) from eta and eta'.
+    q = y(0) t + ..., y = y(0) + ... and the other terms are a exp(lambda t) integrated twice and once, a = lambda y(0)
+    + p. shapes, speeds (r, s): V of elastic modes, and eta', X of the others. maps (2, s, r): y(0) from eta and eta'.
     """
     r, powers, columns, rows, chains = len(shapes), list[int](), list[np.ndarray](), list[np.ndarray](), list[Chain]()
     for k, rate in enumerate(rates.tolist()):
-        drawn, weights = np.zeros(r, complex), slow_powers(rate, lasting)
-        drawn[free] = speeds[free, k]
+        drift, weights = np.zeros(r, complex), slow_powers(rate, duration)
+        drift[free] = speeds[free, k]
         start = np.stack([maps[0, k], maps[1, k], np.zeros(r)])
-        pushed = rate * start
-        pushed[2, free] = maps[1, k, free]
+        acceleration = rate * start
+        acceleration[2, free] = maps[1, k, free]
         powers += 2 * [*range(len(weights) + 2)]
-        columns += [drawn] * (len(weights) + 2) + [shapes[:, k]] * (len(weights) + 2)
-        rows += [0 * start, start, *(weight * pushed for weight in weights)]
-        rows += [start, pushed, *(weight * rate * pushed for weight in weights)]
+        columns += [drift] * (len(weights) + 2) + [shapes[:, k]] * (len(weights) + 2)
+        rows += [0 * start, start, *(weight * acceleration for weight in weights)]
+        rows += [start, acceleration, *(weight * rate * acceleration for weight in weights)]
         mixing = np.array([[0.0, 1.0], [0.0, rate]])
-        chains.append(Chain(mixing, np.column_stack([drawn, shapes[:, k]]), np.stack([np.zeros(r), maps[1, k]])))
-    found, still = np.stack(rows, axis=1), (np.zeros(r, bool), np.zeros(len(powers), bool))
+        chains.append(Chain(mixing, np.column_stack([drift, shapes[:, k]]), np.stack([np.zeros(r), maps[1, k]])))
+    maps_of_terms, flags = np.stack(rows, axis=1), (np.zeros(r, bool), np.zeros(len(powers), bool))
     basis = Exponentials(np.zeros(len(powers), complex), np.array(powers))
-    return ModalResponse(basis, np.column_stack(columns), found[0], found[1], found[2], False, *still, tuple(chains))
+    return ModalResponse(
+        basis,
+        np.column_stack(columns),
+        maps_of_terms[0],
+        maps_of_terms[1],
+        maps_of_terms[2],
+        False,
+        *flags,
+        tuple(chains),
+    )
 
 
-def _integrated(rows: np.ndarray, parts: Parts) -> np.ndarray:
-    """X (n, k), X y' = rows y."""
+def _integral(rows: np.ndarray, parts: Parts) -> np.ndarray:
+    """Return X (n, k) of X y' = rows y."""
     if np.any(np.diagonal(parts.mixing) == 0):
         raise NumericalFailure("modes: friction cancels the stiffness of a mode beside a zero-frequency mode")
     return np.asarray(scipy.linalg.solve_triangular(parts.mixing, rows.T, trans="T").T)
 
 
-def _moving(parts: Parts, shapes: np.ndarray, maps: np.ndarray) -> ModalResponse:
-    """What moves by the parts: their exponentials, each with the powers of its part."""
+def _motion_of_parts(parts: Parts, shapes: np.ndarray, maps: np.ndarray) -> ModalResponse:
+    """Return the motion of the parts: their exponentials, each with the powers of its part."""
     r, rates, powers, columns, rows = len(shapes), list[complex](), list[int](), list[int](), []
     poles, chains = list[bool](), list[Chain]()
     for first, end in parts.groups:
-        own = slice(first, end)
+        part = slice(first, end)
         if end - first == 1:
             rates.append(complex(parts.rates[first]))
             powers.append(0)
             columns.append(first)
-            rows.append(maps[:, own])
+            rows.append(maps[:, part])
             poles.append(True)
             continue
         raised = parts.powers(first, end)
@@ -169,18 +177,18 @@ def _moving(parts: Parts, shapes: np.ndarray, maps: np.ndarray) -> ModalResponse
             rates += [complex(parts.rates[first])] * len(raised)
             powers += range(len(raised))
             columns += [first + i] * len(raised)
-            rows.append(np.einsum("dj,mjr->mdr", raised[:, i], maps[:, own]))
+            rows.append(np.einsum("dj,mjr->mdr", raised[:, i], maps[:, part]))
         poles += [False] * (len(raised) * (end - first))
-        chains.append(Chain(parts.mixing[own, own], shapes[:, own], maps[1][own]))
-    found = np.concatenate(rows, axis=1) if rows else np.zeros((2, 0, r), complex)
+        chains.append(Chain(parts.mixing[part, part], shapes[:, part], maps[1][part]))
+    maps_of_terms = np.concatenate(rows, axis=1) if rows else np.zeros((2, 0, r), complex)
     basis = Exponentials(np.array(rates, complex), np.array(powers, int))
-    nothing = np.zeros_like(found[0])
+    zero = np.zeros_like(maps_of_terms[0])
     return ModalResponse(
         basis=basis,
         shapes=shapes[:, columns],
-        from_displacement=found[0],
-        from_velocity=found[1],
-        from_force=nothing,
+        from_displacement=maps_of_terms[0],
+        from_velocity=maps_of_terms[1],
+        from_force=zero,
         diagonal=False,
         alone=np.zeros(r, bool),
         poles=np.array(poles, bool),
@@ -188,37 +196,42 @@ def _moving(parts: Parts, shapes: np.ndarray, maps: np.ndarray) -> ModalResponse
     )
 
 
-def _following(
+def _initial_drift(
     parts: Parts, shapes: np.ndarray, maps: np.ndarray, free: np.ndarray, alone: np.ndarray
 ) -> ModalResponse:
-    """What the zero-frequency modes, damped or alone, have beside that: a, and a + b t + p t^2 / 2."""
+    """Return the further motion of zero-frequency modes: a of damped ones, a + b t + p t^2 / 2 of undamped ones."""
     r, f, a = len(shapes), len(free), len(alone)
     rate_shapes = shapes @ parts.mixing
-    here, unit = np.concatenate([free, np.repeat(alone, 3)]), np.eye(r)
-    found = np.zeros((3, f + 3 * a, r), complex)
-    found[0][:f] = unit[free] - (shapes[free] @ maps[0]).real
-    found[1][:f] = -(shapes[free] @ maps[1]).real
+    modes, unit = np.concatenate([free, np.repeat(alone, 3)]), np.eye(r)
+    maps_of_terms = np.zeros((3, f + 3 * a, r), complex)
+    maps_of_terms[0][:f] = unit[free] - (shapes[free] @ maps[0]).real
+    maps_of_terms[1][:f] = -(shapes[free] @ maps[1]).real
     starts = f + 3 * np.arange(a)
-    found[0][starts], found[1][starts] = unit[alone] - (shapes[alone] @ maps[0]).real, -(shapes[alone] @ maps[1]).real
-    found[0][starts + 1] = -(rate_shapes[alone] @ maps[0]).real
-    found[1][starts + 1] = unit[alone] - (rate_shapes[alone] @ maps[1]).real
-    found[2][starts + 2] = 0.5 * unit[alone]
+    maps_of_terms[0][starts], maps_of_terms[1][starts] = (
+        unit[alone] - (shapes[alone] @ maps[0]).real,
+        -(shapes[alone] @ maps[1]).real,
+    )
+    maps_of_terms[0][starts + 1] = -(rate_shapes[alone] @ maps[0]).real
+    maps_of_terms[1][starts + 1] = unit[alone] - (rate_shapes[alone] @ maps[1]).real
+    maps_of_terms[2][starts + 2] = 0.5 * unit[alone]
     powers = np.concatenate([np.zeros(f, int), np.tile([0, 1, 2], a)])
     basis = Exponentials(np.zeros(len(powers), complex), powers)
-    poles, itself = np.arange(len(powers)) < f, np.zeros(r, bool)
+    poles, is_alone = np.arange(len(powers)) < f, np.zeros(r, bool)
     chains = list[Chain]()
     for mode, start in zip(alone.tolist(), starts.tolist(), strict=True):
         if np.any(shapes[mode]):
-            along = np.column_stack([unit[mode], np.zeros(r)]).astype(complex)
-            chains.append(Chain(np.eye(2, k=1, dtype=complex), along, found[1][start : start + 2]))
+            column = np.column_stack([unit[mode], np.zeros(r)]).astype(complex)
+            chains.append(Chain(np.eye(2, k=1, dtype=complex), column, maps_of_terms[1][start : start + 2]))
         else:
-            itself[mode] = True
-    beside = unit[:, here].astype(complex)
-    return ModalResponse(basis, beside, found[0], found[1], found[2], False, itself, poles, tuple(chains))
+            is_alone[mode] = True
+    columns = unit[:, modes].astype(complex)
+    return ModalResponse(
+        basis, columns, maps_of_terms[0], maps_of_terms[1], maps_of_terms[2], False, is_alone, poles, tuple(chains)
+    )
 
 
-def _joined(one: ModalResponse, other: ModalResponse) -> ModalResponse:
-    """The sum of two motions of the same modes."""
+def _sum(one: ModalResponse, other: ModalResponse) -> ModalResponse:
+    """Return the sum of two motions of the same modes."""
     basis = Exponentials(
         np.concatenate([one.basis.rates, other.basis.rates]), np.concatenate([one.basis.powers, other.basis.powers])
     )
@@ -246,20 +259,20 @@ def _with_drift(
     free: np.ndarray,
     alone: np.ndarray,
 ) -> ModalResponse:
-    """Adds the motion u + w t of damped zero-frequency modes under a constant force, as far as it moves the parts."""
+    """Add the motion u + w t of damped zero-frequency modes under a constant force, with the parts that it moves."""
     r, count = len(stiffness), len(free)
-    steady = -scipy.linalg.solve_triangular(parts.mixing, maps[1][:, free])  # y of the parts, at rest under a force
-    offset, moving, drift = (shapes @ steady).real, (speeds @ steady).real, np.zeros((r, count))
-    drift[free], offset[free], offset[alone] = moving[free], 0.0, 0.0
+    steady = -scipy.linalg.solve_triangular(parts.mixing, maps[1][:, free])  # constant y of the parts under a force
+    offset, drift_speed, drift = (shapes @ steady).real, (speeds @ steady).real, np.zeros((r, count))
+    drift[free], offset[free], offset[alone] = drift_speed[free], 0.0, 0.0
     powers = np.tile([0, 0, 1], count)  # u, then w t with its derivative w
     basis = Exponentials(np.zeros(3 * count, complex), powers)
-    added = np.stack([offset, drift, drift], axis=2).reshape(r, 3 * count).astype(complex)
+    columns = np.stack([offset, drift, drift], axis=2).reshape(r, 3 * count).astype(complex)
     maps = np.zeros((3, 3 * count, r), complex)
     maps[2][::3, free] = maps[2][2::3, free] = np.eye(count)
     forced = response.from_force.copy()
-    forced[:, free] -= response.from_displacement @ offset + response.from_velocity @ moving
-    carried = -(stiffness[alone] @ offset + damping[alone] @ drift)  # what that does to the modes that others move
-    forced[:, free] += response.from_force[:, alone] @ carried
-    still = np.zeros(r, bool), np.zeros(3 * count, bool)
-    own = ModalResponse(basis, added, maps[0], maps[1], maps[2], False, *still)
-    return _joined(replace(response, from_force=forced), own)
+    forced[:, free] -= response.from_displacement @ offset + response.from_velocity @ drift_speed
+    driving = -(stiffness[alone] @ offset + damping[alone] @ drift)  # acceleration of driven modes by the drift
+    forced[:, free] += response.from_force[:, alone] @ driving
+    flags = np.zeros(r, bool), np.zeros(3 * count, bool)
+    drift_response = ModalResponse(basis, columns, maps[0], maps[1], maps[2], False, *flags)
+    return _sum(replace(response, from_force=forced), drift_response)

@@ -1,9 +1,9 @@
-"""Exponentials: the functions of time that a motion between events is made of, and their derivatives and integrals.
+"""Exponentials: the basis functions of a motion between events, their derivatives and integrals.
 
     phi_j(t) = (t / T)^d_j exp(lambda_j t)
 
-lambda (p,) complex [1/s], T the unit [s] in which powers count time: high powers of seconds leave the range of numbers
-where a motion lasts microseconds or years. Powers d > 0 belong to nearly critical, rigid-body and resonant motion.
+lambda (p,) complex [1/s], T the unit [s] of time in powers: high powers of seconds would overflow or underflow where
+a motion lasts microseconds or years. Powers d > 0 belong to nearly critical, rigid-body and resonant motion.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 __all__ = ["Exponentials", "exponential_integrals"]
 
 SERIES_BELOW = 0.5  # |s T| - d under which t^d exp is integrated by its series: by parts d! / |s T|^d is lost
-SERIES_ROUND_OFF = 1e-18  # of 1: terms of that series below it are left out
+SERIES_ROUND_OFF = 1e-18  # relative: smaller terms of that series are truncated
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Exponentials:
         return np.flatnonzero(self.powers)
 
     def at(self, t: np.ndarray | float) -> np.ndarray:
-        """phi at t: (p,) for a scalar, (k, p) for (k,) times."""
+        """Return phi at t: (p,) for a scalar, (k, p) for (k,) times."""
         times = np.asarray(t, dtype=float)[..., None] if isinstance(t, np.ndarray) else t
         values = np.exp(times * self.rates)
         if not self.pure:
@@ -48,7 +48,7 @@ class Exponentials:
         return np.asarray(values)
 
     def derivative(self, coefficients: np.ndarray) -> np.ndarray:
-        """Coefficients (..., p) of the time derivative."""
+        """Return coefficients (..., p) of the time derivative."""
         result = coefficients * self.rates
         if not self.pure:
             chained = self._chained
@@ -56,16 +56,16 @@ class Exponentials:
         return result
 
     def integrals(self, duration: float | np.ndarray) -> np.ndarray:
-        """Integral of every phi_j over [0, duration], (p,), or (k, p) for durations (k, 1)."""
+        """Return the integral of every phi_j over [0, duration], (p,), or (k, p) for durations (k, 1)."""
         return exponential_integrals(self.rates, self.powers, duration, self.unit)
 
     def shifted(self, coefficients: np.ndarray, delay: float) -> np.ndarray:
-        """Coefficients (..., p) of the same function from a later start: f(t) = g(t + delay)."""
+        """Return coefficients (..., p) of the same function from a later start: f(t) = g(t + delay)."""
         result = coefficients * np.exp(delay * self.rates)
         return result if self.pure else result @ self._translation(delay / self.unit)
 
     def _translation(self, delay: float) -> np.ndarray:
-        """(t + delay)^d expanded in powers of t, both in units, as a matrix from old to new coefficients."""
+        """Return the matrix from old to new coefficients of (t + delay)^d in powers of t, times in units."""
         matrix = np.eye(len(self.powers))
         for j in self._chained:
             degree, binomial = int(self.powers[j]), 1.0
@@ -78,9 +78,9 @@ class Exponentials:
 def exponential_integrals(
     rates: np.ndarray, powers: np.ndarray, duration: float | np.ndarray, unit: float
 ) -> np.ndarray:
-    """Integral of (t / unit)^d exp(s t) over [0, duration], elementwise; d small.
+    """Return the integral of (t / unit)^d exp(s t) over [0, duration], elementwise; d small.
 
-    In units of time: by parts, I_d = (T^d exp(s T) - d I_d-1) / s; for small |s| T by the power series of exp.
+    By parts, I_d = (T^d exp(s T) - d I_d-1) / s; for small |s| T by the power series of exp.
     """
     exponents = rates * duration
     rates, duration = rates * unit, duration / unit

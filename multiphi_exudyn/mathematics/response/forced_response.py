@@ -6,12 +6,12 @@ u = t/T, T the horizon, is solved mode by mode, D diagonal or not, as the sum of
 
     z' = s z + exp(mu t) p(t),   z = exp(mu t) w,   w' = (s - mu) w + p(t)
 
-z belongs to one pole, or to a chain of them (free_response.py), in which each is forced by those behind it as well.
-w is a polynomial of u. Far from the pole (|s - mu| T large) it is the finite one,
+z belongs to one pole, or to a chain of them (free_response.py), in which each is also forced by the later ones.
+w is a polynomial of u. Far from the pole (|s - mu| T large) it is finite,
 
     w_k = ((k + 1) w_k+1 / T - p_k) / (s - mu),   k = D, ..., 0
 
-and near to it, at resonance included, that of the motion from rest, a Taylor series that is cut at round-off:
+and near to it, at resonance included, the Taylor series of the motion from rest, truncated at round-off:
 
     w_k+1 = T ((s - mu) w_k + p_k) / (k + 1),   w_0 = 0
 
@@ -29,17 +29,17 @@ from multiphi_exudyn.mathematics.round_off import SLOW
 
 __all__ = ["particular"]
 
-TAYLOR = 1e-18  # of a Taylor series: terms below it are left out
+TAYLOR = 1e-18  # of a Taylor series: smaller terms are truncated
 NEAREST_FAR = 0.5  # |s - mu| T from which the finite polynomial is taken for a constant p,
-PER_DEGREE = 0.5  # and more for each degree of p: D! / (|s - mu| T)^D is what the finite polynomial loses
-OUTWEIGHED = 10.0  # times the motion: a finite polynomial up to it loses no more than one digit of that
+PER_DEGREE = 0.5  # and more for each degree of p: the finite polynomial loses D! / (|s - mu| T)^D by cancellation
+OUTWEIGHED = 10.0  # times the motion: a finite polynomial up to this size costs at most one digit of the motion
 COINCIDING = 2e-2  # of |s|: poles closer than this are solved together; where one is zero, SLOW of 1 / T or mu
 
 
 def particular(
     squares: np.ndarray, damping: np.ndarray, response: ModalResponse, rate: complex, forces: np.ndarray, horizon: float
 ) -> np.ndarray:
-    """One particular response x (K + 1, r) to modal forces p (D + 1, r) on the carrier ``rate``, good for [0, horizon].
+    """Return a particular response x (K + 1, r) to modal forces p (D + 1, r) on the carrier ``rate``, for [0, horizon].
 
     Both are coefficients of powers of t / horizon.
     squares: omega^2 (r,). damping: D (r, r). response: the closed form of the free motion.
@@ -48,39 +48,39 @@ def particular(
         return np.zeros((1, len(squares)), complex)
     if response.diagonal:
         return _uncoupled(squares, np.diagonal(damping) / 2, rate, forces, horizon)
-    alone, poles = response.alone, response.poles
+    is_alone, poles = response.alone, response.poles
     free = np.zeros((1, len(squares)), complex)
-    if np.any(alone):
-        own = _uncoupled(squares[alone], np.zeros(int(np.sum(alone))), rate, forces[:, alone], horizon)
-        free = _padded(free, len(own))
-        free[:, alone] = own
+    if np.any(is_alone):
+        uncoupled = _uncoupled(squares[is_alone], np.zeros(int(np.sum(is_alone))), rate, forces[:, is_alone], horizon)
+        free = _padded(free, len(uncoupled))
+        free[:, is_alone] = uncoupled
     maps = response.from_velocity[poles] / 2
     shapes, rates = response.shapes[:, poles], response.basis.rates[poles]
     parts = [free]
-    for turned in (np.asarray, np.conj):
-        parts.append(_first_order(turned(rates) - rate, forces @ turned(maps).T, horizon) @ turned(shapes).T)
+    for variant in (np.asarray, np.conj):
+        parts.append(_first_order(variant(rates) - rate, forces @ variant(maps).T, horizon) @ variant(shapes).T)
         for chain in response.chains:
-            given = turned(chain.mixing), forces @ turned(chain.pushes).T / 2
-            parts.append(_chained(*given, rate, horizon) @ turned(chain.shapes).T)
+            arguments = variant(chain.mixing), forces @ variant(chain.pushes).T / 2
+            parts.append(_chained(*arguments, rate, horizon) @ variant(chain.shapes).T)
     longest = max(map(len, parts))
     return np.asarray(sum(_padded(part, longest) for part in parts))
 
 
 def _chained(mixing: np.ndarray, forces: np.ndarray, rate: complex, horizon: float) -> np.ndarray:
-    """w (K + 1, m) of w' = (T - mu) w + p(t), T (m, m) upper triangular, p (D + 1, m): the last one first."""
-    found: list[np.ndarray] = []
+    """Return w (K + 1, m) of w' = (T - mu) w + p(t), T (m, m) upper triangular, p (D + 1, m): the last one first."""
+    solved: list[np.ndarray] = []
     for i in range(len(mixing) - 1, -1, -1):
-        longest = max([len(forces), *map(len, found)])
-        given = _padded(forces[:, [i]], longest)
-        for above, k in zip(found, range(len(mixing) - 1, i, -1), strict=True):
-            given = given + mixing[i, k] * _padded(above, longest)
-        found.append(_first_order(mixing[[i], [i]] - rate, given, horizon))
-    longest = max(map(len, found))
-    return np.hstack([_padded(w, longest) for w in reversed(found)])
+        longest = max([len(forces), *map(len, solved)])
+        input_ = _padded(forces[:, [i]], longest)
+        for later, k in zip(solved, range(len(mixing) - 1, i, -1), strict=True):
+            input_ = input_ + mixing[i, k] * _padded(later, longest)
+        solved.append(_first_order(mixing[[i], [i]] - rate, input_, horizon))
+    longest = max(map(len, solved))
+    return np.hstack([_padded(w, longest) for w in reversed(solved)])
 
 
 def _uncoupled(squares: np.ndarray, delta: np.ndarray, rate: complex, forces: np.ndarray, horizon: float) -> np.ndarray:
-    """x (K + 1, r) of modes with poles -delta +- sqrt(delta^2 - omega^2)."""
+    """Return x (K + 1, r) of modes with poles -delta +- sqrt(delta^2 - omega^2)."""
     root = np.sqrt((delta**2 - squares).astype(complex))
     near = np.where(squares == 0, SLOW * max(1 / horizon, abs(rate)), COINCIDING * np.sqrt(np.abs(squares)))
     together = 2 * np.abs(root) <= near
@@ -98,7 +98,7 @@ def _uncoupled(squares: np.ndarray, delta: np.ndarray, rate: complex, forces: np
 
 
 def _first_order(distance: np.ndarray, forces: np.ndarray, horizon: float) -> np.ndarray:
-    """w (K + 1, q) of w' = distance w + p(t)."""
+    """Return w (K + 1, q) of w' = distance w + p(t)."""
     degree = len(forces) - 1
     far = np.abs(distance) * horizon >= NEAREST_FAR + PER_DEGREE * degree
     near = ~far
@@ -109,15 +109,15 @@ def _first_order(distance: np.ndarray, forces: np.ndarray, horizon: float) -> np
         w[k, far] = (above - forces[k, far]) / distance[far]
     if np.any(near):
         for k in range(len(w) - 1):
-            given = forces[k, near] if k <= degree else 0.0
-            w[k + 1, near] = (distance[near] * w[k, near] + given) * horizon / (k + 1)
+            force = forces[k, near] if k <= degree else 0.0
+            w[k + 1, near] = (distance[near] * w[k, near] + force) * horizon / (k + 1)
     return w
 
 
 def _second_order(
     squares: np.ndarray, delta: np.ndarray, rate: complex, forces: np.ndarray, horizon: float
 ) -> np.ndarray:
-    """w (K + 1, q) of w'' + 2 (delta + mu) w' + (omega^2 + 2 delta mu + mu^2) w = p(t), poles close together."""
+    """Return w (K + 1, q) of w'' + 2 (delta + mu) w' + (omega^2 + 2 delta mu + mu^2) w = p(t), poles close together."""
     degree = len(forces) - 1
     slope, value = 2 * (delta + rate), squares + 2 * delta * rate + rate**2
     distance = np.sqrt(np.abs(value))
@@ -131,14 +131,14 @@ def _second_order(
         w[k, far] = (forces[k, far] - slope[far] * first - second) / value[far]
     if np.any(near):
         for k in range(len(w) - 2):
-            given = forces[k, near] if k <= degree else 0.0
-            pulled = slope[near] * (k + 1) / horizon * w[k + 1, near] + value[near] * w[k, near]
-            w[k + 2, near] = (given - pulled) * horizon**2 / ((k + 1) * (k + 2))
+            force = forces[k, near] if k <= degree else 0.0
+            restoring = slope[near] * (k + 1) / horizon * w[k + 1, near] + value[near] * w[k, near]
+            w[k + 2, near] = (force - restoring) * horizon**2 / ((k + 1) * (k + 2))
     return w
 
 
 def _terms(degree: int, reach: float, order: int) -> int:
-    """Coefficients of a Taylor series up to round-off, reach = |distance| T."""
+    """Return the number of Taylor coefficients up to round-off, reach = |distance| T."""
     term, count = 1.0, 0
     while term > TAYLOR:
         count += 1
@@ -147,6 +147,6 @@ def _terms(degree: int, reach: float, order: int) -> int:
 
 
 def _padded(x: np.ndarray, rows: int) -> np.ndarray:
-    """x with zero rows below, at least ``rows``."""
+    """Return x with zero rows appended, up to at least ``rows``."""
     missing = max(0, rows - len(x))
     return np.pad(x, ((0, missing), (0, 0))) if missing else x

@@ -5,8 +5,8 @@
 
 omega^2 < 0 is a growing mode. D [1/s] is diagonal for proportional damping: then each mode has its own closed
 form (underdamped, overdamped, nearly critical by a Taylor polynomial, zero frequency, growing). A zero-frequency mode
-whose damping is slow beside the time that its motion lasts moves by powers of time: exponentials would be large terms,
-of eta' / D and p / D^2, with small differences. Modes that are coupled are in coupled_response.py. Constant forces on
+whose damping is slow compared with the duration of its motion has powers of time instead: exponentials would be large
+terms, of eta' / D and p / D^2, with small differences. Coupled modes are in coupled_response.py. Constant forces on
 modes of non-zero frequency belong to the asymptotic configuration, not here.
 """
 
@@ -23,13 +23,13 @@ from multiphi_exudyn.mathematics.round_off import SLOW
 
 __all__ = ["Chain", "ModalResponse", "is_slow", "slow_powers", "uncoupled"]
 
-NEARLY_CRITICAL = 1e-2  # |zeta^2 - 1|^(1/2) under which the Taylor polynomial of degree 5 is the more exact form
-LAST_POWER = 1e-17  # of the first: a power of time, in the speed of what is slow, that is left out
+NEARLY_CRITICAL = 1e-2  # |zeta^2 - 1|^(1/2) below which the Taylor polynomial of degree 5 is more accurate
+LAST_POWER = 1e-17  # of the first: powers of time below this, in the speed of slow motion, are truncated
 
 
 @dataclass(frozen=True)
 class Chain:
-    """Components y (m,) of a motion that move each other one way: y' = T y + B p, eta = ... + Re V y.
+    """Components y (m,) of a motion, each driven by later ones only: y' = T y + B p, eta = ... + Re V y.
 
     mixing: T (m, m) upper triangular. shapes: V (r, m). pushes: B (m, r).
     """
@@ -44,8 +44,8 @@ class ModalResponse:
     """The closed form of the module's equation.
 
     basis: the p exponentials. shapes: V (r, p) complex. from_displacement, from_velocity, from_force:
-    A, B, P (p, r) complex. diagonal: whether D was diagonal to round-off. alone: (r,) modes with an equation of their
-    own. Of the other modes' motion poles (p,) are the exponentials that are one of it by themselves, chains the rest.
+    A, B, P (p, r) complex. diagonal: whether D was diagonal to round-off. alone: (r,) modes with an equation of
+    their own. In the motion of the other modes poles (p,) marks the exponentials of single poles; chains have the rest.
     """
 
     basis: Exponentials
@@ -61,17 +61,17 @@ class ModalResponse:
     def coefficients(
         self, displacement: np.ndarray, velocity: np.ndarray, force: np.ndarray | None = None
     ) -> np.ndarray:
-        """c (p,) of the motion that starts at eta(0), eta'(0), both (r,)."""
+        """Return c (p,) of the motion that starts at eta(0), eta'(0), both (r,)."""
         c: np.ndarray = (self._from_state @ np.concatenate([displacement, velocity])).view(complex)
         return c if force is None else c + self.from_force @ force
 
     def sizes(self, displacement: np.ndarray, velocity: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Of which terms (p,) the coefficients are the sums, from the sizes (r,) of eta(0), eta'(0) and p."""
+        """Return the sums of |terms| (p,) of the coefficients, from the sizes (r,) of eta(0), eta'(0) and p."""
         maps = np.abs(self.from_displacement), np.abs(self.from_velocity), np.abs(self.from_force)
         return np.asarray(maps[0] @ displacement + maps[1] @ velocity + maps[2] @ force)
 
     def state(self, coefficients: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """eta(t), eta'(t), both (r,)."""
+        """Return eta(t), eta'(t), both (r,)."""
         r, values = len(self.shapes), self.basis.at(t)
         if not self.basis.pure:
             rate = self.basis.derivative(coefficients)
@@ -81,38 +81,38 @@ class ModalResponse:
 
     @functools.cached_property
     def _from_state(self) -> np.ndarray:
-        """[A, B] on real and imaginary parts, (2p, 2r): one real product where two complex ones stood."""
+        """[A, B] on real and imaginary parts, (2p, 2r): one real product instead of two complex ones."""
         both = np.hstack([self.from_displacement, self.from_velocity])
         return np.stack([both.real, both.imag], axis=1).reshape(2 * both.shape[0], both.shape[1])
 
     @functools.cached_property
     def _to_state(self) -> np.ndarray:
-        """(eta, eta') from real and imaginary parts of c phi, (2r, 2p), where every power is zero."""
+        """(eta, eta') from real and imaginary parts of c phi, (2r, 2p), for zero powers."""
         both = np.vstack([self.shapes, self.shapes * self.basis.rates])
         return np.stack([both.real, -both.imag], axis=2).reshape(both.shape[0], 2 * both.shape[1])
 
 
-def is_slow(rates: np.ndarray | complex, lasting: float) -> np.ndarray:
-    """Which rates [1/s] are slow beside the time [s] that a motion lasts at most; zero alone where that is infinite."""
-    return np.asarray(np.abs(rates) <= SLOW / lasting)
+def is_slow(rates: np.ndarray | complex, duration: float) -> np.ndarray:
+    """Return which rates [1/s] are slow for motions of at most ``duration`` [s]; only zero for an infinite duration."""
+    return np.asarray(np.abs(rates) <= SLOW / duration)
 
 
-def slow_powers(rate: complex, lasting: float) -> list[complex]:
-    """rate^n / (n + 2)!, n = 0, 1, ..., of a slow rate: exp(rate t) integrated twice is t^2 sum_n t^n of these."""
-    found, size = [0.5 + 0j], abs(rate) * lasting
+def slow_powers(rate: complex, duration: float) -> list[complex]:
+    """Return w_n = rate^n / (n + 2)!, n = 0, 1, ...; exp(rate t) integrated twice is t^2 sum_n w_n t^n."""
+    weights, size = [0.5 + 0j], abs(rate) * duration
     speed = size / 2  # of the next power, in units of the first
     while speed > LAST_POWER:
-        found.append(found[-1] * rate / (len(found) + 2))
-        speed *= size / (len(found) + 1)
-    return found
+        weights.append(weights[-1] * rate / (len(weights) + 2))
+        speed *= size / (len(weights) + 1)
+    return weights
 
 
-def uncoupled(squares: np.ndarray, damping: np.ndarray, lasting: float = math.inf) -> ModalResponse:
-    """Closed form for omega^2 (r,) [rad2/s2], negative for growing modes, and damping D_ii (r,) [1/s].
+def uncoupled(squares: np.ndarray, damping: np.ndarray, duration: float = math.inf) -> ModalResponse:
+    """Return the closed form for omega^2 (r,) [rad2/s2], negative for growing modes, and damping D_ii (r,) [1/s].
 
-    lasting: for motions of that time [s] at most.
+    duration: of the longest motion [s].
     """
-    terms = [term for k in range(len(squares)) for term in _mode_terms(k, squares[k], damping[k] / 2, lasting)]
+    terms = [term for k in range(len(squares)) for term in _mode_terms(k, squares[k], damping[k] / 2, duration)]
     p, r = len(terms), len(squares)
     shapes, maps = np.zeros((r, p), complex), np.zeros((3, p, r), complex)
     for j, (k, _, _, weights) in enumerate(terms):
@@ -126,10 +126,10 @@ def uncoupled(squares: np.ndarray, damping: np.ndarray, lasting: float = math.in
 Term = tuple[int, complex, int, tuple[complex, complex, complex]]  # mode, rate, power, weights of eta, eta', p
 
 
-def _mode_terms(k: int, square: float, delta: float, lasting: float) -> list[Term]:
-    """Terms of one mode eta'' + 2 delta eta' + omega^2 eta = p, omega^2 = ``square``."""
+def _mode_terms(k: int, square: float, delta: float, duration: float) -> list[Term]:
+    """Return the terms of one mode eta'' + 2 delta eta' + omega^2 eta = p, omega^2 = ``square``."""
     if square == 0.0:
-        return _free_terms(k, delta, lasting)
+        return _free_terms(k, delta, duration)
     if square < 0:
         return _growing_terms(k, square, delta)
     omega = np.sqrt(square)
@@ -150,7 +150,7 @@ def _mode_terms(k: int, square: float, delta: float, lasting: float) -> list[Ter
 
 
 def _growing_terms(k: int, square: float, delta: float) -> list[Term]:
-    """Terms of omega^2 < 0, delta >= 0: one rate grows and one decays, the smaller of them from their product."""
+    """Return the terms of omega^2 < 0, delta >= 0: a growing and a decaying rate, the smaller from their product."""
     decaying = -(delta + np.sqrt(delta**2 - square))
     growing = square / decaying
     difference = growing - decaying
@@ -160,13 +160,13 @@ def _growing_terms(k: int, square: float, delta: float) -> list[Term]:
     ]
 
 
-def _free_terms(k: int, delta: float, lasting: float) -> list[Term]:
-    """Terms of eta'' + 2 delta eta' = p; of what is slow p - 2 delta eta'(0) with its decay is integrated twice."""
+def _free_terms(k: int, delta: float, duration: float) -> list[Term]:
+    """Return the terms of eta'' + 2 delta eta' = p; slow ones are p - 2 delta eta'(0) with decay, integrated twice."""
     rate, first = 2 * delta, [(k, 0.0, 0, (1.0, 0.0, 0.0)), (k, 0.0, 1, (0.0, 1.0, 0.0))]
     if delta == 0.0:
         return [*first, (k, 0.0, 2, (0.0, 0.0, 0.5))]
-    if is_slow(rate, lasting):
-        further = enumerate(slow_powers(-rate, lasting), start=2)
+    if is_slow(rate, duration):
+        further = enumerate(slow_powers(-rate, duration), start=2)
         return [*first, *((k, 0.0, n, (0.0, -rate * weight, weight)) for n, weight in further)]
     return [
         (k, 0.0, 0, (1.0, 1 / rate, -1 / rate**2)),

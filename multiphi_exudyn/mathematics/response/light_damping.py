@@ -1,4 +1,4 @@
-"""Free response of oscillating modes that damping couples lightly: what each has of the others, by iteration.
+"""Free response of oscillating modes with light damping coupling: components of the other modes by iteration.
 
     (lambda^2 + lambda D + diag(omega^2)) v = 0,   D = diag(d) + G symmetric,   v_i = 1 in pair i
 
@@ -7,9 +7,9 @@ From v = e_i, every row j gives its component, and row i the rate:
     v_j = -lambda (G v)_j / (omega_j^2 - omega_i^2 + lambda (d_j - d_i - (G v)_i)),   j not i
     lambda^2 + lambda (d_i + (G v)_i) + omega_i^2 = 0
 
-all pairs at once. It converges by the factor that damping is of the distance of two modes. As D is symmetric, the
-same vectors make the motion of a start (F. Tisseur, K. Meerbergen, The quadratic eigenvalue problem, SIAM Rev. 43
-(2001) 235, sec. 3):
+all pairs at once. The error falls by the ratio of damping to the distance of two modes in every step. As D is
+symmetric, the same vectors give the motion from an initial state (F. Tisseur, K. Meerbergen, The quadratic eigenvalue
+problem, SIAM Rev. 43 (2001) 235, sec. 3):
 
     eta(t) = Re sum_i v_i c_i exp(lambda_i t),   c_i = 2 v_i . (eta'(0) - omega^2 eta(0) / lambda_i) / theta_i
     theta_i = v_i . (2 lambda_i + D) v_i
@@ -28,32 +28,32 @@ from multiphi_exudyn.mathematics.response.free_response import ModalResponse
 
 __all__ = ["lightly_damped"]
 
-LIGHT = 0.2  # of omega, and of a distance of two modes: more damping is not light
+LIGHT = 0.2  # of omega, and of a distance of two modes: larger damping is not light
 SYMMETRIC = 1e-13  # of the largest damping: round-off of a symmetric matrix
-LAST = 2e-16  # of a mode: the step after the last, if it is as much smaller as the least of those before
+LAST = 2e-16  # of a mode: predicted next step, from the slowest reduction so far
 MOST_STEPS = 30  # of the iteration; three to ten are typical
 
 
 def lightly_damped(squares: np.ndarray, damping: np.ndarray) -> ModalResponse | None:
-    """Closed form for omega^2 (r,) and damping D (r, r); None where D is not symmetric, or not light."""
+    """Return the closed form for omega^2 (r,) and damping D (r, r); None where D is not symmetric, or not light."""
     r = len(squares)
     numbers = np.concatenate([squares, damping.diagonal(), damping, np.zeros((4 * r + 2, r))], axis=None)
     if not start_pairs(numbers, r):
         return None
     rows = numbers.reshape(-1, r)
-    coupling, vectors, moved = rows[2 : 2 + r], rows[2 + r : 2 + 3 * r], rows[2 + 3 * r : 2 + 5 * r]
-    before, falls = 1.0, 0.0
+    coupling, vectors, products = rows[2 : 2 + r], rows[2 + r : 2 + 3 * r], rows[2 + 3 * r : 2 + 5 * r]
+    previous, reduction = 1.0, 0.0
     for _ in range(MOST_STEPS):
         step = improve_pairs(numbers, r)
-        before, falls = step, max(falls, step / before)
-        vectors.dot(coupling, out=moved)
-        if step * falls <= LAST:
+        previous, reduction = step, max(reduction, step / previous)
+        vectors.dot(coupling, out=products)
+        if step * reduction <= LAST:
             return _response(numbers, r)
     return None
 
 
 def _response(numbers: np.ndarray, r: int) -> ModalResponse:
-    """Closed form for vectors that are found."""
+    """Return the closed form from converged vectors."""
     waves = np.zeros((1 + 4 * r, r), complex)
     write_response(numbers, waves.ravel(), r)
     nothing, every, powers = _flags(r)
@@ -77,88 +77,91 @@ def _flags(r: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 @compiled
 def start(numbers: Numbers, r: int) -> int:
-    """Whether damping is symmetric, and light for every mode and for every distance of two; then v = e_i.
+    """Return 1 where damping is symmetric and light for all modes and their distances, and start with v = e_i.
 
-    numbers: omega^2, d (r,), D (r, r), of which G is made; v and G v of all pairs, a row each, (r, r), first real, then
+    numbers: omega^2, d (r,), D (r, r), replaced by G; v and G v of all pairs, a row each, (r, r), first real, then
     imaginary parts; lambda (2, r).
     """
-    coupling, vectors, moved, largest = 2 * r, (2 + r) * r, (2 + 3 * r) * r, 0.0
+    coupling, vectors, products, largest = 2 * r, (2 + r) * r, (2 + 3 * r) * r, 0.0
     for i in range(r):
-        own = numbers[r + i]
-        largest = max(largest, own)
-        if not abs(own) < LIGHT * math.sqrt(max(numbers[i], 0.0)):
+        damping = numbers[r + i]
+        largest = max(largest, damping)
+        if not abs(damping) < LIGHT * math.sqrt(max(numbers[i], 0.0)):
             return 0
         numbers[coupling + i * r + i] = 0.0
         numbers[vectors + i * r + i] = 1.0
     for j in range(r):
-        others = 0.0
+        row_sum = 0.0
         for k in range(r):
-            given = numbers[coupling + j * r + k]
-            if not abs(given - numbers[coupling + k * r + j]) <= SYMMETRIC * largest:
+            value = numbers[coupling + j * r + k]
+            if not abs(value - numbers[coupling + k * r + j]) <= SYMMETRIC * largest:
                 return 0
-            others += abs(given)
-            numbers[moved + j * r + k] = given
+            row_sum += abs(value)
+            numbers[products + j * r + k] = value
         for i in range(r):
-            if i != j and not others * math.sqrt(numbers[i]) <= LIGHT * abs(numbers[j] - numbers[i]):
+            if i != j and not row_sum * math.sqrt(numbers[i]) <= LIGHT * abs(numbers[j] - numbers[i]):
                 return 0
     return 1
 
 
 @compiled
 def set_rate(numbers: Numbers, r: int, i: int) -> int:
-    """lambda of pair i from G v, the root above the real axis; 0 where there is none."""
-    moved, rates = (2 + 3 * r + i) * r + i, (2 + 5 * r) * r + i
-    half = 0.5 * complex(numbers[r + i] + numbers[moved], numbers[moved + r * r])
-    left = numbers[i] - half * half
-    if not left.real > 0.0:
+    """Set lambda of pair i from G v, the root above the real axis; return 0 where there is none."""
+    product, rates = (2 + 3 * r + i) * r + i, (2 + 5 * r) * r + i
+    half = 0.5 * complex(numbers[r + i] + numbers[product], numbers[product + r * r])
+    difference = numbers[i] - half * half
+    if not difference.real > 0.0:
         return 0
-    root = math.sqrt(0.5 * (abs(left) + left.real))
-    numbers[rates] = -0.5 * left.imag / root - half.real
+    root = math.sqrt(0.5 * (abs(difference) + difference.real))
+    numbers[rates] = -0.5 * difference.imag / root - half.real
     numbers[rates + r] = root - half.imag
     return 1
 
 
 @compiled
 def improve(numbers: Numbers, r: int) -> float:
-    """One step of all pairs from G v to v; by how much a part of v changes at most, infinite where one is no number."""
-    vectors, moved, rates, step = (2 + r) * r, (2 + 3 * r) * r, (2 + 5 * r) * r, 0.0
+    """Update v of all pairs from G v; return the largest change of a part of v, infinite where one is not finite."""
+    vectors, products, rates, step = (2 + r) * r, (2 + 3 * r) * r, (2 + 5 * r) * r, 0.0
     for i in range(r):
         if set_rate(numbers, r, i) == 0:
             return math.inf
         rate, row = complex(numbers[rates + i], numbers[rates + r + i]), i * r
-        whole = complex(numbers[r + i] + numbers[moved + row + i], numbers[moved + r * r + row + i])
+        diagonal = complex(numbers[r + i] + numbers[products + row + i], numbers[products + r * r + row + i])
         for j in range(r):
             if j != i:
-                v, others = vectors + row + j, complex(numbers[moved + row + j], numbers[moved + r * r + row + j])
-                apart = numbers[j] - numbers[i] + rate * (numbers[r + j] - whole)
-                size = apart.real * apart.real + apart.imag * apart.imag
-                found = -rate * others * apart.conjugate() * (1.0 / size)
-                change = max(abs(found.real - numbers[v]), abs(found.imag - numbers[v + r * r]))
+                v, coupling = (
+                    vectors + row + j,
+                    complex(numbers[products + row + j], numbers[products + r * r + row + j]),
+                )
+                denominator = numbers[j] - numbers[i] + rate * (numbers[r + j] - diagonal)
+                size = denominator.real * denominator.real + denominator.imag * denominator.imag
+                component = -rate * coupling * denominator.conjugate() * (1.0 / size)
+                change = max(abs(component.real - numbers[v]), abs(component.imag - numbers[v + r * r]))
                 if not change < math.inf:
                     return math.inf
                 step = max(step, change)
-                numbers[v], numbers[v + r * r] = found.real, found.imag
+                numbers[v], numbers[v + r * r] = component.real, component.imag
     return step
 
 
 @compiled
 def write(numbers: Numbers, waves: Waves, r: int) -> None:
-    """lambda (r,), then of all pairs v, and what a start's places and speeds give it, a row each, (r, r)."""
-    vectors, moved, rates = (2 + r) * r, (2 + 3 * r) * r, (2 + 5 * r) * r
+    """Set lambda (r,), then v of all pairs, and their maps from displacement and velocity, a row each, (r, r)."""
+    vectors, products, rates = (2 + r) * r, (2 + 3 * r) * r, (2 + 5 * r) * r
     for i in range(r):
         set_rate(numbers, r, i)
         rate, row, theta = complex(numbers[rates + i], numbers[rates + r + i]), i * r, 0j
         for j in range(r):
             v = complex(numbers[vectors + row + j], numbers[vectors + r * r + row + j])
-            others = complex(numbers[moved + row + j], numbers[moved + r * r + row + j])
+            others = complex(numbers[products + row + j], numbers[products + r * r + row + j])
             theta += v * ((2.0 * rate + numbers[r + j]) * v + others)
             waves[r + row + j] = v
         weight = theta.conjugate() * (2.0 / (theta.real * theta.real + theta.imag * theta.imag))
-        turned = rate.conjugate() * (-1.0 / (rate.real * rate.real + rate.imag * rate.imag))
+        inverse_rate = rate.conjugate() * (-1.0 / (rate.real * rate.real + rate.imag * rate.imag))
         waves[i] = rate
         for j in range(r):
             on_speed = weight * waves[r + row + j]
-            waves[(1 + r) * r + row + j] = numbers[j] * (turned * on_speed)
+            waves[(1 + r) * r + row + j] = numbers[j] * (inverse_rate * on_speed)
             waves[(1 + 2 * r) * r + row + j] = on_speed
 
 

@@ -2,14 +2,14 @@
 
     eta'' + D eta' + S eta = p,   eta(t) = Re V (c phi(t)),   c = A eta(0) + B eta'(0) + P p
 
-D and S (r, r) are whatever the rates, shapes and maps were made for; nothing is symmetric here.
+D and S (r, r) need not be symmetric; rates, shapes and maps follow from them.
 
 A response is a record in the ints:
 
     ints[response + MODES]               r
     ints[response + FREE]                the basis of its p exponentials (basis_arrays.py)
-    ints[response + REACHED]             where first and last + 1 of the modes that an exponential takes part in begin
-                                         in the ints, (p, 2): elsewhere V, A, B and P are zero
+    ints[response + REACHED]             where first and last + 1 of the modes of every exponential begin in the ints,
+                                         (p, 2): V, A, B and P are zero for the other modes
     ints[response + FROM_DISPLACEMENT]   where A (p, r) begins in the waves
     ints[response + FROM_VELOCITY]       B (p, r)
     ints[response + FROM_FORCE]          P (p, r)
@@ -28,8 +28,8 @@ Forced response, as forced_response.py has it, to p = Re( exp(mu t) sum_d p_d u^
 
 as the sum of equations of first order, z' = s z + exp(mu t) p(t), for every pole s; two poles that (nearly) coincide
 are one equation of second order. On the carrier mu = 0 only the real parts count, and of a pole and its conjugate one
-is solved: twice the real part of its response is that to both. Beside a motion the finite polynomials are taken nearer
-to the poles than there, as long as they are not much larger than it: what cancels is round-off of the motion.
+is solved: twice the real part of its response is that to both. Beside a free motion the finite polynomials are
+used nearer to the poles, as long as they are not much larger: their cancellation is then round-off of the motion.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ CHAIN = 4  # ints of a chain
 
 
 def reached_modes(maps: Sequence[np.ndarray]) -> np.ndarray:
-    """The modes (p, 2) of every exponential, first and one past the last of those where a map (p, r) is not 0."""
+    """Return first and last + 1 (p, 2) of the modes of every exponential, for which a map (p, r) is not zero."""
     p, r = maps[0].shape
     reached = np.zeros((p, 2), int)
     if any(part.all() for part in maps):
@@ -90,17 +90,20 @@ def reached_modes(maps: Sequence[np.ndarray]) -> np.ndarray:
 def coefficients_of(
     ints: Ints, numbers: Numbers, waves: Waves, response: int, eta: int, eta_t: int, force: int, result: int
 ) -> None:
-    """c (p,) of the motion that starts at eta, eta' (r,) under the constant modal force p (r,), -1 for none."""
+    """Set c (p,) of the motion that starts at eta, eta' (r,) under the constant modal force p (r,), -1 for none."""
     r, p, reached = ints[response + MODES], ints[ints[response + FREE] + SIZE], ints[response + REACHED]
     for j in range(p):
-        moved, pushed = ints[response + FROM_DISPLACEMENT] + j * r, ints[response + FROM_VELOCITY] + j * r
+        from_displacement, from_velocity = (
+            ints[response + FROM_DISPLACEMENT] + j * r,
+            ints[response + FROM_VELOCITY] + j * r,
+        )
         c = 0j
         for i in range(ints[reached + 2 * j], ints[reached + 2 * j + 1]):
-            c += waves[moved + i] * numbers[eta + i] + waves[pushed + i] * numbers[eta_t + i]
+            c += waves[from_displacement + i] * numbers[eta + i] + waves[from_velocity + i] * numbers[eta_t + i]
         if force >= 0:
-            forced = ints[response + FROM_FORCE] + j * r
+            from_force = ints[response + FROM_FORCE] + j * r
             for i in range(ints[reached + 2 * j], ints[reached + 2 * j + 1]):
-                c += waves[forced + i] * numbers[force + i]
+                c += waves[from_force + i] * numbers[force + i]
         waves[result + j] = c
 
 
@@ -108,7 +111,7 @@ def coefficients_of(
 def state_of(
     ints: Ints, numbers: Numbers, waves: Waves, response: int, c: int, t: float, eta: int, eta_t: int, scratch: int
 ) -> None:
-    """eta(t), eta'(t) (r,) of the motion with coefficients c (p,); scratch: 2p waves."""
+    """Set eta(t), eta'(t) (r,) of the motion with coefficients c (p,); scratch: 2p waves."""
     r, basis = ints[response + MODES], ints[response + FREE]
     p, reached, shapes = ints[basis + SIZE], ints[response + REACHED], ints[response + SHAPES]
     phi, rate = scratch, scratch + p
@@ -140,11 +143,11 @@ def forced_response(
     scratch: int,
     result: int,
 ) -> int:
-    """One response x (K + 1, r) to modal forces p (degree + 1, r) on a carrier, good for [0, horizon]: K + 1.
+    """Set one response x (K + 1, r) to modal forces p (degree + 1, r) on a carrier, for [0, horizon]; return K + 1.
 
-    eta, eta_t: where the motion (r,) that it becomes part of begins in the numbers, beside which it may be large.
-    carrier: where its mu stands in the waves. most: rows that there is room for, more than the degree; where a larger
-    number comes back, so many are needed, and x is nothing. scratch: (2 + m) ``most`` waves, m of the longest chain.
+    eta, eta_t: offsets of the total motion (r,) in the numbers; the response may have its size. carrier: offset of mu
+    in the waves. most: number of rows with memory, more than the degree; a larger result is the number needed, without
+    x. scratch: (2 + m) ``most`` waves, m of the longest chain.
     """
     r, basis = ints[response + MODES], ints[response + FREE]
     rows = clear_rows(waves, result, r, 0, 1)
@@ -172,12 +175,17 @@ def forced_response(
 
 
 @compiled
-def moving_at(ints: Ints, numbers: Numbers, waves: Waves, response: int, j: int, eta: int, eta_t: int) -> float:
-    """|A eta + B eta'| of one exponential of coupled modes: how large it is in a motion."""
+def motion_of_exponential(
+    ints: Ints, numbers: Numbers, waves: Waves, response: int, j: int, eta: int, eta_t: int
+) -> float:
+    """Return |A eta + B eta'| of one exponential of coupled modes: its size in a motion."""
     r, reached, total = ints[response + MODES], ints[response + REACHED] + 2 * j, 0j
-    moved, pushed = ints[response + FROM_DISPLACEMENT] + j * r, ints[response + FROM_VELOCITY] + j * r
+    from_displacement, from_velocity = (
+        ints[response + FROM_DISPLACEMENT] + j * r,
+        ints[response + FROM_VELOCITY] + j * r,
+    )
     for i in range(ints[reached], ints[reached + 1]):
-        total += waves[moved + i] * numbers[eta + i] + waves[pushed + i] * numbers[eta_t + i]
+        total += waves[from_displacement + i] * numbers[eta + i] + waves[from_velocity + i] * numbers[eta_t + i]
     return abs(total)
 
 
@@ -190,8 +198,8 @@ def force_mode(
     forces: int,
     degree: int,
     horizon: float,
-    place: float,
-    speed: float,
+    displacement: float,
+    velocity: float,
     mode: int,
     r: int,
     rows: int,
@@ -199,45 +207,45 @@ def force_mode(
     scratch: int,
     x: int,
 ) -> int:
-    """Adds the response of one mode, eta'' + 2 delta eta' + omega^2 eta = p, to x (rows, r): its rows then.
+    """Add the response of one mode, eta'' + 2 delta eta' + omega^2 eta = p, to x; return its number of rows.
 
     Poles -delta +- (delta^2 - omega^2)^(1/2), apart or together.
     """
-    mu, difference, given = waves[carrier], delta * delta - square, scratch + most
-    both = mu == 0 and difference < 0.0
+    mu, difference, input_ = waves[carrier], delta * delta - square, scratch + most
+    is_real = mu == 0 and difference < 0.0
     root, near = math.sqrt(abs(difference)), COINCIDING * math.sqrt(abs(square))
     if square == 0.0:
         near = SLOW * max(1.0 / horizon, math.hypot(mu.real, mu.imag))
     if 2 * root <= near:
         for d in range(degree + 1):
-            waves[given + d] = waves[forces + d * r + mode]
-        own = second_order(waves, square, delta, mu.real, mu.imag, given, degree, horizon, most, scratch)
-        return add_mode(waves, scratch, own, mode, r, rows, most, x)
+            waves[input_ + d] = waves[forces + d * r + mode]
+        count = second_order(waves, square, delta, mu.real, mu.imag, input_, degree, horizon, most, scratch)
+        return add_mode(waves, scratch, count, mode, r, rows, most, x)
     fast = complex(-delta - root, 0.0) if difference > 0.0 else complex(-delta, -root)
     ratio = square / (fast.real * fast.real + fast.imag * fast.imag)
-    moving = abs(place) + abs(speed) / root
+    motion = abs(displacement) + abs(velocity) / root
     weight = complex(0.5 / root, 0.0) if difference > 0.0 else complex(0.0, -0.5 / root)
-    for sign in range(1 if both else 2):
+    for sign in range(1 if is_real else 2):
         pole = fast - mu if sign == 1 else complex(ratio * fast.real, -ratio * fast.imag) - mu
         for d in range(degree + 1):
-            push = waves[forces + d * r + mode]
-            waves[given + d] = weight * (complex(2.0 * push.real, 0.0) if both else push)
+            force = waves[forces + d * r + mode]
+            waves[input_ + d] = weight * (complex(2.0 * force.real, 0.0) if is_real else force)
         size = modulus(pole.real, pole.imag)
-        own = first_order(waves, pole.real, pole.imag, size, given, degree, horizon, moving, most, scratch)
-        for k in range(min(own, most) if both else 0):
+        count = first_order(waves, pole.real, pole.imag, size, input_, degree, horizon, motion, most, scratch)
+        for k in range(min(count, most) if is_real else 0):
             waves[scratch + k] = complex(waves[scratch + k].real, 0.0)
-        rows = add_mode(waves, scratch, own, mode, r, rows, most, x)
+        rows = add_mode(waves, scratch, count, mode, r, rows, most, x)
         weight = -weight
     return rows
 
 
 @compiled
-def add_mode(waves: Waves, w: int, own: int, mode: int, r: int, rows: int, most: int, x: int) -> int:
-    """Adds w (own,) to a mode's column of x (rows, r), where there is room for it: its rows then."""
-    if max(own, rows) > most:
-        return max(own, rows)
-    rows = clear_rows(waves, x, r, rows, own)
-    for k in range(own):
+def add_mode(waves: Waves, w: int, count: int, mode: int, r: int, rows: int, most: int, x: int) -> int:
+    """Add w (own,) to a mode's column of x (rows, r) if memory suffices; return its number of rows."""
+    if max(count, rows) > most:
+        return max(count, rows)
+    rows = clear_rows(waves, x, r, rows, count)
+    for k in range(count):
         waves[x + k * r + mode] += waves[w + k]
     return rows
 
@@ -261,37 +269,37 @@ def force_pole(
     scratch: int,
     x: int,
 ) -> int:
-    """Adds the response of one exponential of coupled modes, or of its conjugate, to x (rows, r): its rows then.
+    """Add the response of one exponential of coupled modes, or of its conjugate, to x; return its number of rows.
 
     w' = (lambda - mu) w + B p / 2 along V, with conj(lambda), conj(B), conj(V) where ``mirrored`` is 1; of both where
     mu = 0.
     """
-    r, reached, given = ints[response + MODES], ints[response + REACHED] + 2 * j, scratch + most
+    r, reached, input_ = ints[response + MODES], ints[response + REACHED] + 2 * j, scratch + most
     maps, shapes = ints[response + FROM_VELOCITY] + j * r, ints[response + SHAPES] + j * r
     pole, mu, sign = waves[ints[ints[response + FREE] + RATES] + j], waves[carrier], 1.0 - 2.0 * mirrored
-    both = mu == 0
+    is_real = mu == 0
     for d in range(degree + 1):
         push = 0j
         for i in range(ints[reached], ints[reached + 1]):
             weight, force = waves[maps + i], waves[forces + d * r + i]
-            if both:
+            if is_real:
                 push += weight * force.real
             else:
                 push += complex(0.5 * weight.real, 0.5 * sign * weight.imag) * force
-        waves[given + d] = push
+        waves[input_ + d] = push
     distance = complex(pole.real, sign * pole.imag) - mu
-    size, moving = modulus(distance.real, distance.imag), 0.0
+    size, motion = modulus(distance.real, distance.imag), 0.0
     if is_far(size, degree, horizon) == 0:
-        moving = moving_at(ints, numbers, waves, response, j, eta, eta_t)
-    own = first_order(waves, distance.real, distance.imag, size, given, degree, horizon, moving, most, scratch)
-    if max(own, rows) > most:
-        return max(own, rows)
-    rows = clear_rows(waves, x, r, rows, own)
-    for k in range(own):
+        motion = motion_of_exponential(ints, numbers, waves, response, j, eta, eta_t)
+    count = first_order(waves, distance.real, distance.imag, size, input_, degree, horizon, motion, most, scratch)
+    if max(count, rows) > most:
+        return max(count, rows)
+    rows = clear_rows(waves, x, r, rows, count)
+    for k in range(count):
         for i in range(ints[reached], ints[reached + 1]):
             shape = waves[shapes + i]
-            moved = waves[scratch + k] * complex(shape.real, sign * shape.imag)
-            waves[x + k * r + i] += complex(moved.real, 0.0) if both else moved
+            term = waves[scratch + k] * complex(shape.real, sign * shape.imag)
+            waves[x + k * r + i] += complex(term.real, 0.0) if is_real else term
     return rows
 
 
@@ -311,9 +319,9 @@ def force_chain(
     scratch: int,
     x: int,
 ) -> int:
-    """Adds the response of a chain, or of its conjugate, to x (rows, r), the last component first: its rows then."""
+    """Add the response of a chain, or of its conjugate, to x, the last component first; return its number of rows."""
     m, mixing, shapes, pushes = ints[chain], ints[chain + 1], ints[chain + 2], ints[chain + 3]
-    mu, sign, highest, given = waves[carrier], 1.0 - 2.0 * mirrored, degree, scratch + m * most
+    mu, sign, highest, input_ = waves[carrier], 1.0 - 2.0 * mirrored, degree, scratch + m * most
     for i in range(m - 1, -1, -1):
         for d in range(highest + 1):
             push = 0j
@@ -323,18 +331,18 @@ def force_chain(
             for k in range(i + 1, m):
                 weight = waves[mixing + i * m + k]
                 push += complex(weight.real, sign * weight.imag) * waves[scratch + k * most + d]
-            waves[given + d] = push
+            waves[input_ + d] = push
         pole, w = waves[mixing + i * m + i], scratch + i * most
         distance = complex(pole.real, sign * pole.imag) - mu
         size = modulus(distance.real, distance.imag)
-        own = first_order(waves, distance.real, distance.imag, size, given, highest, horizon, 0.0, most, w)
-        if max(own, rows) > most:
-            return max(own, rows)
-        for d in range(own, most):
+        count = first_order(waves, distance.real, distance.imag, size, input_, highest, horizon, 0.0, most, w)
+        if max(count, rows) > most:
+            return max(count, rows)
+        for d in range(count, most):
             waves[w + d] = 0j
-        highest = max(highest, own - 1)
-        rows = clear_rows(waves, x, r, rows, own)
-        for d in range(own):
+        highest = max(highest, count - 1)
+        rows = clear_rows(waves, x, r, rows, count)
+        for d in range(count):
             for j in range(r):
                 shape = waves[shapes + i * r + j]
                 waves[x + d * r + j] += waves[w + d] * complex(shape.real, sign * shape.imag)

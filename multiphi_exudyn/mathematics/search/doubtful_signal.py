@@ -1,13 +1,13 @@
-"""A suspect: the one signal whose interval is in doubt, divided until it is decided, on flat buffers.
+"""A suspect: a signal that may have a root in an interval, which is divided until that is decided, on flat buffers.
 
     g(t) = constant + Re sum_j a_j phi_j(t),   max|g^(k)| <= bound_k, k = 0 ... 6
 
-An interval is divided until monotony or curvature of certified sign decides, and an inverse Taylor series finishes; the
+An interval is divided until certified monotony or curvature decides; an inverse Taylor series gives the root. The
 bounds and their source are those of zero_crossing.py.
 
 It is a record in the numbers: g and its derivatives (5,) at the ends of the interval, at a point, and at its minimum;
-its constant; since when its times count; bounds of |g| ... |g^(6)|; which |g^(k)|, k < 3, are round-off; the last root
-found; how many samples were taken; and a stack of the intervals that follow: their ends, g and its derivatives there.
+its constant; the origin of its times; bounds of |g| ... |g^(6)|; the round-off of |g^(k)|, k < 3; the last root; the
+number of samples; and a stack of later intervals: their ends, g and its derivatives there.
 Its coefficients and those of its derivatives, (5, p), are the ``rows`` in the waves, with p more to work in.
 """
 
@@ -16,7 +16,7 @@ from __future__ import annotations
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.response.basis_arrays import SIZE, differentiate, exponentials
 from multiphi_exudyn.mathematics.round_off import ZERO
-from multiphi_exudyn.mathematics.search.hermite_root import guess
+from multiphi_exudyn.mathematics.search.hermite_root import estimate
 from multiphi_exudyn.mathematics.search.signal_bounds import DERIVATIVES, HERMITE, LIFTED, QUINTIC, round_off
 
 __all__ = [
@@ -31,23 +31,23 @@ __all__ = [
     "divide",
     "find_root",
     "sample_at",
-    "take_up",
+    "set_suspect",
 ]
 
-SAMPLED = 5  # g and its derivatives up to the fourth are known at every point of a division
-NARROWEST = 1e-13  # of an interval's end in its block: an interval in doubt is not divided below this
-TIME_ROUND_OFF = 1e-15  # of the time itself: a root is not sought closer
+SAMPLED = 5  # g and its derivatives up to the fourth are computed at every point of a division
+NARROWEST = 1e-13  # of an interval's end in its block: narrower intervals are not divided
+TIME_ROUND_OFF = 1e-15  # of the time itself: accuracy of a root
 MOST_STEPS = 100  # towards a root; a dozen is many
 LEFT, RIGHT, POINT, MINIMUM = 0, 5, 10, 15
 CONSTANT, ORIGIN, BOUNDS, NOISE, ROOT, SAMPLES, STACK = 20, 21, 22, 29, 32, 33, 34
 DEEPEST = 64  # divisions: 1e-13 is reached after 44
 SUSPECT = STACK + DEEPEST * (1 + SAMPLED)  # numbers of the record
-ROWS = SAMPLED + 1  # in p: waves of its coefficients and to work in
+ROWS = SAMPLED + 1  # in p: waves of its coefficients and working memory
 UNDECIDED, NO_DESCENT, DESCENT = 0, 1, 2
 
 
 @compiled
-def take_up(
+def set_suspect(
     ints: Ints,
     numbers: Numbers,
     waves: Waves,
@@ -60,7 +60,7 @@ def take_up(
     suspect: int,
     rows: int,
 ) -> None:
-    """A signal becomes the suspect: its record, and the coefficients (5, p) of g and its derivatives in ``rows``."""
+    """Make a signal the suspect: set its record, and the coefficients (5, p) of g and its derivatives in ``rows``."""
     p = ints[basis + SIZE]
     numbers[suspect + CONSTANT] = constant
     numbers[suspect + ORIGIN] = origin
@@ -79,7 +79,7 @@ def take_up(
 def sample_at(
     ints: Ints, numbers: Numbers, waves: Waves, basis: int, u: float, suspect: int, result: int, rows: int
 ) -> None:
-    """The suspect and its first four derivatives (5,) a time u after its origin."""
+    """Set the suspect and its first four derivatives (5,) at time u after its origin."""
     p, phi = ints[basis + SIZE], rows + SAMPLED * ints[basis + SIZE]
     exponentials(ints, numbers, waves, basis, u, numbers[suspect + ORIGIN] + u, phi)
     combine(numbers, waves, p, phi, suspect, result, rows)
@@ -88,7 +88,7 @@ def sample_at(
 
 @compiled
 def combine(numbers: Numbers, waves: Waves, p: int, phi: int, suspect: int, result: int, rows: int) -> None:
-    """The suspect and its first four derivatives (5,) where the exponentials are phi."""
+    """Set the suspect and its first four derivatives (5,) at exponentials phi."""
     for k in range(SAMPLED):
         value = 0.0
         for j in range(p):
@@ -108,20 +108,20 @@ def divide(
     suspect: int,
     rows: int,
 ) -> int:
-    """DESCENT, at the suspect's root, or NO_DESCENT in [left, right], by division until every part is decided.
+    """Return DESCENT, with the root of the suspect, or NO_DESCENT in [left, right], by division.
 
-    The suspect is known at both ends.
+    The samples of the suspect at both ends have to be set.
     """
     narrowest, depth = NARROWEST * right, 0
     while True:
         verdict = decide(ints, numbers, waves, basis, left, right, narrowest, suspect, rows)
         if verdict == DESCENT:
             return DESCENT
-        follower = suspect + STACK + (1 + SAMPLED) * depth
+        stacked = suspect + STACK + (1 + SAMPLED) * depth
         if verdict == UNDECIDED:
-            numbers[follower] = right
+            numbers[stacked] = right
             for k in range(SAMPLED):
-                numbers[follower + 1 + k] = numbers[suspect + RIGHT + k]
+                numbers[stacked + 1 + k] = numbers[suspect + RIGHT + k]
             depth += 1
             right = (left + right) / 2
             sample_at(ints, numbers, waves, basis, right, suspect, suspect + RIGHT, rows)
@@ -129,10 +129,10 @@ def divide(
             if depth == 0:
                 return NO_DESCENT
             depth -= 1
-            left, right = right, numbers[follower - 1 - SAMPLED]
+            left, right = right, numbers[stacked - 1 - SAMPLED]
             for k in range(SAMPLED):
                 numbers[suspect + LEFT + k] = numbers[suspect + RIGHT + k]
-                numbers[suspect + RIGHT + k] = numbers[follower - SAMPLED + k]
+                numbers[suspect + RIGHT + k] = numbers[stacked - SAMPLED + k]
 
 
 @compiled
@@ -147,9 +147,9 @@ def decide(
     suspect: int,
     rows: int,
 ) -> int:
-    """What certified bounds of g, g', g'' say about a descent of the suspect in [left, right].
+    """Return DESCENT with the root of the suspect in [left, right], NO_DESCENT, or UNDECIDED.
 
-    DESCENT at its root, NO_DESCENT, or UNDECIDED.
+    The decision is certified by bounds of g, g', g''.
     """
     width, noise = right - left, numbers[suspect + NOISE]
     at_left, at_right = numbers[suspect + LEFT], numbers[suspect + RIGHT]
@@ -175,7 +175,7 @@ def decide(
 
 @compiled
 def lowest(numbers: Numbers, suspect: int, order: int, sign: float, width: float) -> float:
-    """What sign times a derivative of the suspect is certainly above: its Bernstein coefficients less the remainder."""
+    """Return a lower bound of sign times a derivative of the suspect: least Bernstein coefficient minus remainder."""
     left, right = sign * numbers[suspect + LEFT + order], sign * numbers[suspect + RIGHT + order]
     inner_left = left + sign * width * numbers[suspect + LEFT + order + 1] / 3
     inner_right = right - sign * width * numbers[suspect + RIGHT + order + 1] / 3
@@ -185,7 +185,7 @@ def lowest(numbers: Numbers, suspect: int, order: int, sign: float, width: float
 
 @compiled
 def lowest_value(numbers: Numbers, suspect: int, sign: float, width: float) -> float:
-    """The same of the suspect itself, whose second derivative is known too, by the quintic."""
+    """Return the same for the suspect itself, by the quintic, with its second derivatives."""
     left, right, first, second = suspect + LEFT, suspect + RIGHT, sign * width / 5, sign * width * width / 20
     at_left, at_right = sign * numbers[left], sign * numbers[right]
     inner = min(at_left + first * numbers[left + 1], at_right - first * numbers[right + 1])
@@ -197,9 +197,9 @@ def lowest_value(numbers: Numbers, suspect: int, sign: float, width: float) -> f
 
 @compiled
 def rises(numbers: Numbers, suspect: int, width: float) -> int:
-    """1 where the suspect starts at zero or above and stays above it.
+    """Return 1 where the suspect starts at zero or above and stays above zero.
 
-    By g/t, as ``least_room`` says; or by the first derivative that counts, with Taylor's remainder.
+    By g/t as in ``room_in_interval``, or by the first derivative that is not round-off, with Taylor's remainder.
     """
     left, right, bounds = suspect + LEFT, suspect + RIGHT, suspect + BOUNDS
     if numbers[left] < -numbers[suspect + NOISE]:
@@ -228,15 +228,15 @@ def decide_convex(
     suspect: int,
     rows: int,
 ) -> int:
-    """DESCENT or NO_DESCENT of a convex piece: it lies before the minimum, if the minimum lies below zero.
+    """Return DESCENT or NO_DESCENT of a convex piece; a root lies before the minimum, if that is below zero.
 
-    A guess of the minimum is enough where g is below zero there, or its tangent above zero in all of the interval.
+    An estimate of the minimum is enough where g is below zero there, or where the tangent is above zero everywhere.
     """
     noise, lower = numbers[suspect + NOISE], suspect + RIGHT
     if numbers[suspect + LEFT + 1] >= -numbers[suspect + NOISE + 1]:
         return NO_DESCENT
     if numbers[suspect + RIGHT + 1] > 0.0 and numbers[lower] >= -noise:
-        t = left + (right - left) * guess(numbers, suspect + LEFT + 1, suspect + RIGHT + 1, right - left)
+        t = left + (right - left) * estimate(numbers, suspect + LEFT + 1, suspect + RIGHT + 1, right - left)
         lower = suspect + MINIMUM
         sample_at(ints, numbers, waves, basis, t, suspect, lower, rows)
         if numbers[lower] > abs(numbers[lower + 1]) * (right - left):
@@ -265,14 +265,14 @@ def find_root(
     at_right: int,
     rows: int,
 ) -> None:
-    """Root in [left, right] of the suspect (order 0, falling) or of its derivative (order 1, rising).
+    """Find the root in [left, right] of the suspect (order 0, falling) or of its derivative (order 1, rising).
 
     Inverse Taylor series to third order, kept inside the bracket, from inverse Hermite interpolation.
-    at_right: where g and its derivatives at the right end stand.
+    at_right: offset of g and its derivatives at the right end.
     """
     sign = 1.0 if order == 0 else -1.0
     tolerance, point = TIME_ROUND_OFF * right, suspect + POINT + order
-    t = left + (right - left) * guess(numbers, suspect + LEFT + order, at_right + order, right - left)
+    t = left + (right - left) * estimate(numbers, suspect + LEFT + order, at_right + order, right - left)
     for _ in range(MOST_STEPS):
         sample_at(ints, numbers, waves, basis, t, suspect, suspect + POINT, rows)
         value, slope = numbers[point], numbers[point + 1]
@@ -280,15 +280,15 @@ def find_root(
             left = t
         else:
             right = t
-        following = (left + right) / 2
+        next_t = (left + right) / 2
         if slope != 0.0:
             newton, c2, c3 = value / slope, numbers[point + 2] / (2 * slope), numbers[point + 3] / (6 * slope)
-            better = t - newton - c2 * newton * newton - (2 * c2 * c2 - c3) * newton * newton * newton
-            left_out = 5 * abs(c2) * (c2 * c2 + abs(c3)) + numbers[suspect + BOUNDS + order + 4] / (24 * abs(slope))
-            if left_out * newton * newton * newton * newton <= tolerance or abs(newton) <= tolerance:
-                t = min(max(better, left), right)
+            improved = t - newton - c2 * newton * newton - (2 * c2 * c2 - c3) * newton * newton * newton
+            truncated = 5 * abs(c2) * (c2 * c2 + abs(c3)) + numbers[suspect + BOUNDS + order + 4] / (24 * abs(slope))
+            if truncated * newton * newton * newton * newton <= tolerance or abs(newton) <= tolerance:
+                t = min(max(improved, left), right)
                 break
-            if left < better < right:
-                following = better
-        t = following
+            if left < improved < right:
+                next_t = improved
+        t = next_t
     numbers[suspect + ROOT] = t

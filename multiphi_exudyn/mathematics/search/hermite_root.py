@@ -1,15 +1,15 @@
-"""Where in an interval a monotone function is about zero, from its values and slopes at both ends."""
+"""Estimate of the root of a monotone function in an interval, from its values and slopes at both ends."""
 
 from __future__ import annotations
 
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled
 
-__all__ = ["guess"]
+__all__ = ["estimate"]
 
 
 @compiled
-def guess(numbers: Numbers, at_left: int, at_right: int, width: float) -> float:
-    """Where in its interval, as a fraction, a monotone function is zero: inverse cubic Hermite interpolation."""
+def estimate(numbers: Numbers, at_left: int, at_right: int, width: float) -> float:
+    """Return the root of a monotone function as a fraction of its interval, by inverse cubic Hermite interpolation."""
     rise = numbers[at_right] - numbers[at_left]
     slope_left, slope_right = numbers[at_left + 1], numbers[at_right + 1]
     s = -numbers[at_left] / rise if rise != 0.0 else 0.5

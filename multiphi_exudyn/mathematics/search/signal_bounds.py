@@ -26,8 +26,8 @@ __all__ = [
     "HERMITE",
     "INTERVALS",
     "LIFTED",
-    "OF_A_SIGNAL",
     "OPPOSITE",
+    "PER_SIGNAL",
     "QUINTIC",
     "all_above",
     "all_finite",
@@ -38,11 +38,11 @@ __all__ = [
 ]
 
 DERIVATIVES = 7  # g and its derivatives up to the sixth are bounded
-OPPOSITE = 7  # 1 where a signal moves as the one before it does, in the opposite direction, else 0
-OF_A_SIGNAL = 8  # numbers: its bounds, and whether it is opposite
-BOUNDING = 4  # in p: numbers that are worked in behind the bounds
+OPPOSITE = 7  # 1 where a signal is the previous one with the opposite sign, but for its constant, else 0
+PER_SIGNAL = 8  # numbers: its bounds, and whether it is opposite
+BOUNDING = 4  # in p: working numbers behind the bounds
 INTERVALS = 64  # in a block
-RESOLUTION = 0.004  # wanted remainder of a block's intervals, of the signal's typical size
+RESOLUTION = 0.004  # remainder of a block's intervals, relative to the typical size of the signal
 HERMITE = 1 / 384
 QUINTIC = 1 / 46080  # max of u^3 (1 - u)^3 / 720 on [0, 1]
 LIFTED = 1 / 162  # max of u (1 - u)^2 / 24 on [0, 1]
@@ -60,31 +60,31 @@ def bound(
     latest: float,
     bounds: int,
 ) -> None:
-    """Upper bounds of |g|, |g'|, ..., |g^(6)| on [start, latest], constants left out, and which signals are opposite.
+    """Set upper bounds of |g|, |g'|, ..., |g^(6)| on [start, latest], without constants, and the flags OPPOSITE.
 
     sum_j b_j with b_j = |a_j| (latest / T)^d_j exp(min(Re lambda_j, 0) start + max(Re lambda_j, 0) latest) for g; every
-    derivative has |lambda_j| b_j + d_j+1 / latest b_j+1 in place of b_j, where j + 1 is of the next power. BOUNDING p
-    numbers behind the bounds are worked in.
+    derivative has |lambda_j| b_j + d_j+1 / latest b_j+1 in place of b_j, where j + 1 has the next power. BOUNDING p
+    numbers behind the bounds are working memory.
     """
     p, powers, rates = ints[basis + SIZE], ints[basis + POWERS], ints[basis + RATES]
-    sizes, fast, envelope, link = bounds + OF_A_SIGNAL * count, p, 2 * p, 3 * p
-    ratio, height = latest / numbers[ints[basis + SCALES]], 1.0
+    sizes, fast, envelope, link = bounds + PER_SIGNAL * count, p, 2 * p, 3 * p
+    ratio, factor = latest / numbers[ints[basis + SCALES]], 1.0
     for j in range(p):
         decay = waves[rates + j].real
         numbers[sizes + link + j] = 0.0
         if ints[powers + j] > 0:
-            height *= ratio
+            factor *= ratio
             numbers[sizes + link + j - 1] = ints[powers + j] / latest
         else:
             exponent = decay * (start if decay < 0.0 else latest)
-            height = exponential_size(exponent) if exponent != 0.0 else 1.0
-        numbers[sizes + envelope + j] = height
+            factor = exponential_size(exponent) if exponent != 0.0 else 1.0
+        numbers[sizes + envelope + j] = factor
         numbers[sizes + fast + j] = magnitude(waves, rates + j)
     for s in range(count):
-        own, opposite = bounds + OF_A_SIGNAL * s, is_opposite(waves, signals + s * p, p) if s > 0 else 0
-        numbers[own + OPPOSITE] = opposite
+        first, opposite = bounds + PER_SIGNAL * s, is_opposite(waves, signals + s * p, p) if s > 0 else 0
+        numbers[first + OPPOSITE] = opposite
         for k in range(DERIVATIVES if opposite == 1 else 0):
-            numbers[own + k] = numbers[own - OF_A_SIGNAL + k]
+            numbers[first + k] = numbers[first - PER_SIGNAL + k]
         for j in range(p if opposite == 0 else 0):
             numbers[sizes + j] = magnitude(waves, signals + s * p + j) * numbers[sizes + envelope + j]
         for k in range(DERIVATIVES if opposite == 0 else 0):
@@ -94,12 +94,12 @@ def bound(
                 total += size
                 linked = numbers[sizes + link + j] * numbers[sizes + j + 1]  # the last one to none
                 numbers[sizes + j] = size * numbers[sizes + fast + j] + linked
-            numbers[own + k] = total
+            numbers[first + k] = total
 
 
 @compiled
 def is_opposite(waves: Waves, signal: int, p: int) -> int:
-    """1 where the coefficients (p,) of a signal are those of the one before it with the other sign."""
+    """Return 1 where the coefficients (p,) of a signal are those of the previous one with the opposite sign."""
     for j in range(p):
         if waves[signal + j] != -waves[signal - p + j]:
             return 0
@@ -108,18 +108,18 @@ def is_opposite(waves: Waves, signal: int, p: int) -> int:
 
 @compiled
 def all_above(numbers: Numbers, constants: int, bounds: int, count: int) -> int:
-    """1 where every constant outweighs all that moves."""
+    """Return 1 where every constant is larger than the bound of its variable part."""
     for s in range(count):
-        if not numbers[constants + s] > numbers[bounds + OF_A_SIGNAL * s]:
+        if not numbers[constants + s] > numbers[bounds + PER_SIGNAL * s]:
             return 0
     return 1
 
 
 @compiled
 def all_finite(numbers: Numbers, constants: int, bounds: int, count: int) -> int:
-    """1 where the signals and their highest derivatives are bounded by finite numbers."""
+    """Return 1 where the bounds of signals and of their highest derivatives are finite."""
     for s in range(count):
-        first = bounds + OF_A_SIGNAL * s
+        first = bounds + PER_SIGNAL * s
         if not abs(numbers[constants + s]) + numbers[first] + numbers[first + DERIVATIVES - 1] < math.inf:
             return 0
     return 1
@@ -127,28 +127,28 @@ def all_finite(numbers: Numbers, constants: int, bounds: int, count: int) -> int
 
 @compiled
 def sample_distance(numbers: Numbers, constants: int, bounds: int, count: int, remaining: float) -> float:
-    """Sample distance of the next block: a power of two, at which the remainder is small beside the signals.
+    """Return the sample distance of the next block: a power of two with a small remainder relative to the signals.
 
-    Never more than what takes the block to the horizon, where it ends at once.
+    It is at most the one with which the block reaches the horizon.
     """
     longest = power_of_two_above(remaining / INTERVALS)
     step = math.inf
     for s in range(count):
-        fourth = numbers[bounds + OF_A_SIGNAL * s + 4]
+        fourth = numbers[bounds + PER_SIGNAL * s + 4]
         if fourth > 0.0:
-            wanted = RESOLUTION * (abs(numbers[constants + s]) + numbers[bounds + OF_A_SIGNAL * s]) / HERMITE
+            wanted = RESOLUTION * (abs(numbers[constants + s]) + numbers[bounds + PER_SIGNAL * s]) / HERMITE
             distance = math.sqrt(math.sqrt(wanted / fourth))
-            step = min(step, distance) if distance > 0.0 else step  # what has decayed below all numbers limits nothing
+            step = min(step, distance) if distance > 0.0 else step  # zero after underflow: no limit
     return min(longest, power_of_two_above(step) / 2) if step < math.inf else longest
 
 
 @compiled
 def power_of_two_above(value: float) -> float:
-    """The smallest power of two that is greater than ``value``."""
+    """Return the smallest power of two that is greater than ``value``."""
     return math.ldexp(1.0, math.frexp(value)[1])
 
 
 @compiled
 def round_off(size: float, constant: float, noise: float) -> float:
-    """What |g| is round-off of its terms, or of what they are made of."""
+    """Return the size of |g| below which it is round-off of its terms, or of their own terms (noise)."""
     return max(ZERO * (size + abs(constant)), noise)

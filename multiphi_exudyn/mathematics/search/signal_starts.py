@@ -1,4 +1,4 @@
-"""What values and slopes of signals at t = 0 tell of their first descent, with bounds of their derivatives.
+"""First descent of signals near t = 0, from values and slopes there and from bounds of their derivatives.
 
 Signals are as in zero_crossing.py, on flat buffers.
 """
@@ -8,8 +8,8 @@ from __future__ import annotations
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.response.basis_arrays import ETERNAL, POWERS, RATES, SCALES, SIZE
 from multiphi_exudyn.mathematics.search.block_search import NONE
-from multiphi_exudyn.mathematics.search.doubtful_signal import LEFT, RIGHT, find_root, sample_at, take_up
-from multiphi_exudyn.mathematics.search.signal_bounds import OF_A_SIGNAL, round_off
+from multiphi_exudyn.mathematics.search.doubtful_signal import LEFT, RIGHT, find_root, sample_at, set_suspect
+from multiphi_exudyn.mathematics.search.signal_bounds import PER_SIGNAL, round_off
 
 __all__ = ["near_descent", "sample_start", "stay_above"]
 
@@ -18,7 +18,7 @@ __all__ = ["near_descent", "sample_start", "stay_above"]
 def sample_start(
     ints: Ints, numbers: Numbers, waves: Waves, basis: int, signals: int, constants: int, bounds: int, count: int
 ) -> None:
-    """g and g' of every signal at t = 0, (count, 2), behind the bounds."""
+    """Set g and g' of every signal at t = 0, (count, 2), behind the bounds."""
     p, powers, rates, unit = ints[basis + SIZE], ints[basis + POWERS], ints[basis + RATES], ints[basis + SCALES]
     for s in range(count):
         value, slope = numbers[constants + s], 0.0
@@ -29,23 +29,23 @@ def sample_start(
                 slope += (a * waves[rates + j]).real
             elif ints[powers + j] == 1:
                 slope += a.real / numbers[unit]
-        numbers[bounds + OF_A_SIGNAL * count + 2 * s] = value
-        numbers[bounds + OF_A_SIGNAL * count + 2 * s + 1] = slope
+        numbers[bounds + PER_SIGNAL * count + 2 * s] = value
+        numbers[bounds + PER_SIGNAL * count + 2 * s + 1] = slope
 
 
 @compiled
 def stay_above(numbers: Numbers, constants: int, noise: int, bounds: int, count: int, horizon: float) -> int:
-    """1 where by values and slopes at t = 0 no signal falls in [0, horizon].
+    """Return 1 where values and slopes at t = 0 prove that no signal falls in [0, horizon].
 
-    One that starts at zero or above rises all the time where g' > max|g''| t; one that starts above zero is above
-    g + g' t - max|g''| t^2 / 2, which is lowest at one of its ends.
+    A signal that starts at zero or above rises while g' > max|g''| t; one that starts above zero is above
+    g + g' t - max|g''| t^2 / 2, which is least at one of the ends.
     """
     for s in range(count):
-        first, start = bounds + OF_A_SIGNAL * s, bounds + OF_A_SIGNAL * count + 2 * s
-        value, slope, bent = numbers[start], numbers[start + 1], numbers[first + 2] * horizon
-        lowest = min(value, value + (slope - bent / 2) * horizon)
+        first, start = bounds + PER_SIGNAL * s, bounds + PER_SIGNAL * count + 2 * s
+        value, slope, slope_change = numbers[start], numbers[start + 1], numbers[first + 2] * horizon
+        lowest = min(value, value + (slope - slope_change / 2) * horizon)
         touches = value >= -round_off(numbers[first], numbers[constants + s], numbers[noise + s])
-        if not lowest > 0.0 and not (touches and slope > bent):
+        if not lowest > 0.0 and not (touches and slope > slope_change):
             return 0
     return 1
 
@@ -65,22 +65,22 @@ def near_descent(
     suspect: int,
     scratch_wave: int,
 ) -> int:
-    """A first descent near t = 0 that Taylor's theorem certifies at once, NONE if it is not that plain.
+    """Return the signal with a first descent near t = 0 that Taylor's theorem certifies, NONE if it does not.
 
     2 g max|g''| < g'^2 (Kantorovich) gives a falling g one root before 2 g / |g'|; the others stay above zero.
-    valid: how long the bounds hold, for ever where nothing grows. Every power is zero. g and g' at t = 0 are known.
+    valid: until when the bounds hold, for ever where nothing grows. All powers are zero. g and g' at t = 0 are set.
     """
-    p, starts = ints[basis + SIZE], bounds + OF_A_SIGNAL * count
+    p, starts = ints[basis + SIZE], bounds + PER_SIGNAL * count
     for s in range(count):
         value, slope = numbers[starts + 2 * s], numbers[starts + 2 * s + 1]
-        if value > 0.0 and slope < 0.0 and 2 * value * numbers[bounds + OF_A_SIGNAL * s + 2] < slope * slope:
+        if value > 0.0 and slope < 0.0 and 2 * value * numbers[bounds + PER_SIGNAL * s + 2] < slope * slope:
             latest = -2 * value / slope
             if (latest <= valid or ints[basis + ETERNAL] == 1) and others_stay_above(
                 numbers, starts, bounds, count, s, latest
             ) == 1:
-                take_up(
+                set_suspect(
                     ints, numbers, waves, basis, signals + s * p, numbers[constants + s], numbers[noise + s],
-                    bounds + OF_A_SIGNAL * s, 0.0, suspect, scratch_wave,
+                    bounds + PER_SIGNAL * s, 0.0, suspect, scratch_wave,
                 )  # fmt: skip
                 sample_at(ints, numbers, waves, basis, 0.0, suspect, suspect + LEFT, scratch_wave)
                 sample_at(ints, numbers, waves, basis, latest, suspect, suspect + RIGHT, scratch_wave)
@@ -91,9 +91,9 @@ def near_descent(
 
 @compiled
 def others_stay_above(numbers: Numbers, starts: int, bounds: int, count: int, falling: int, latest: float) -> int:
-    """1 where by their values and slopes at t = 0 no other signal falls before ``latest``."""
+    """Return 1 where values and slopes at t = 0 prove that no other signal falls before ``latest``."""
     for s in range(count):
-        first = bounds + OF_A_SIGNAL * s
+        first = bounds + PER_SIGNAL * s
         high = numbers[starts + 2 * s] > numbers[first + 1] * latest
         if s != falling and not high and not numbers[starts + 2 * s + 1] > numbers[first + 2] * latest:
             return 0

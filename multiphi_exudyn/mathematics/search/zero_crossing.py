@@ -1,6 +1,6 @@
 """First descent of signals through zero, certified: no crossing is stepped over; on flat buffers.
 
-    g(t) = constant + Re sum_j a_j phi_j(t),   wanted: the first t in (start, horizon] with g falling below 0
+    g(t) = constant + Re sum_j a_j phi_j(t),   result: the first t in (start, horizon] with g falling below 0
 
 s signals on one basis (basis_arrays.py): a (s, p) in the waves, constants (s,) and noise (s,) in the numbers. Between
 two samples a distance h apart g differs from its cubic Hermite interpolant by at most h^4/384 max|g^(4)|, and
@@ -9,9 +9,9 @@ coefficients:
 
     min(g0, g0 + h g0'/3, g1 - h g1'/3, g1) > h^4/384 max|g^(4)|
 
-proves that an interval holds no root. Intervals follow each other, wider where all signals are far from zero; in one
-that stays in doubt g is divided until monotony or curvature of certified sign decides, and an inverse Taylor series
-finishes. A touch without crossing is no descent. The answer does not depend on the samples.
+proves that an interval holds no root. Intervals are wider where all signals are far from zero; an undecided one is
+divided until certified monotony or curvature decides, and an inverse Taylor series gives the root. A touch without
+crossing is no descent. The result does not depend on the samples.
 
 Source of the bounds: P. J. Davis, Interpolation and Approximation, 1963, ch. 3; G. Farin, Curves and Surfaces
 for CAGD, ch. 5.
@@ -40,7 +40,7 @@ from multiphi_exudyn.mathematics.search.signal_bounds import (
     BOUNDING,
     DERIVATIVES,
     INTERVALS,
-    OF_A_SIGNAL,
+    PER_SIGNAL,
     all_above,
     all_finite,
     bound,
@@ -61,23 +61,23 @@ __all__ = [
     "simultaneous",
 ]
 
-NOT_FINITE, TOO_LONG = -2, -3  # as NONE, instead of the signal that falls
-RESULT = 4  # numbers: time of the descent; samples, added up; sample distance and time left where it is TOO_LONG
+NOT_FINITE, TOO_LONG = -2, -3  # in place of the falling signal, like NONE
+RESULT = 4  # numbers: time of the descent; total samples; sample distance and remaining time for TOO_LONG
 
-PATIENCE = 1000  # blocks, less than a second, after which a search looks at how many are left,
-MOST_BLOCKS = 1_000_000  # of which it takes so many at most: minutes
-WINDOW = 1.0  # of the time in which the fastest growing exponential grows e-fold: bounds hold no longer than twice this
-SIMULTANEOUS = 1e-11  # of sum |a_j|: a falling signal farther from zero at another's root has its own later,
-INSTANT = 1e-9  # of 1 / max |lambda|: and so has one that is nearer but takes longer, unless it is round-off
+PATIENCE = 1000  # blocks, less than a second, after which a search checks how many remain,
+MOST_BLOCKS = 1_000_000  # at most: minutes
+WINDOW = 1.0  # of the time in which the fastest growing exponential grows e-fold: bounds hold for at most twice this
+SIMULTANEOUS = 1e-11  # of sum |a_j|: a falling signal farther from zero at another's root has a later root,
+INSTANT = 1e-9  # of 1 / max |lambda|: and so has a nearer one that needs more time, unless it is round-off
 
 
 def scratch_numbers(p: int, count: int) -> int:
-    """Numbers that a search among so many signals on p exponentials works in."""
-    return SUSPECT + BOUNDING * p + (OF_A_SIGNAL + 4) * count
+    """Return the count of working numbers of a search among ``count`` signals on p exponentials."""
+    return SUSPECT + BOUNDING * p + (PER_SIGNAL + 4) * count
 
 
 def scratch_waves(p: int, count: int) -> int:
-    """Waves that it works in."""
+    """Return its count of working waves."""
     return p * (LOCAL + 2 * count)
 
 
@@ -97,18 +97,18 @@ def first_descent(
     scratch_wave: int,
     result: int,
 ) -> int:
-    """The signal that falls first in (start, horizon], its time in the result; NONE, NOT_FINITE or TOO_LONG.
+    """Return the signal that falls first in (start, horizon], its time in the result; NONE, NOT_FINITE or TOO_LONG.
 
-    scratch, scratch_wave: where ``scratch_numbers`` numbers and ``scratch_waves`` waves are free.
+    scratch, scratch_wave: offsets of ``scratch_numbers`` numbers and ``scratch_waves`` waves of working memory.
     """
     scales, suspect, bounds = ints[basis + SCALES], scratch, scratch + SUSPECT
     growth = numbers[scales + 2]
     window = WINDOW / growth if growth > 0.0 else math.inf
     numbers[suspect + SAMPLES] = 0.0
-    found, searched, before, begin = NONE, 0, 0.0, start
-    while found == NONE and begin < horizon and count > 0:
-        until = min(horizon, begin + window)
-        latest = 2 * until - begin  # a block may end behind
+    falling, blocks, previous_step, begin = NONE, 0, 0.0, start
+    while falling == NONE and begin < horizon and count > 0:
+        window_end = min(horizon, begin + window)
+        latest = 2 * window_end - begin  # a block may end later than the window
         bound(ints, numbers, waves, basis, signals, count, begin, latest, bounds)
         if ints[basis + ETERNAL] == 1 and all_above(numbers, constants, bounds, count) == 1:
             break
@@ -116,31 +116,31 @@ def first_descent(
             return NOT_FINITE
         if begin == 0.0:
             sample_start(ints, numbers, waves, basis, signals, constants, bounds, count)
-            if until == horizon and stay_above(numbers, constants, noise, bounds, count, horizon) == 1:
+            if window_end == horizon and stay_above(numbers, constants, noise, bounds, count, horizon) == 1:
                 break
         if begin == 0.0 and count > 1 and ints[basis + PURE] == 1:
-            found = near_descent(
+            falling = near_descent(
                 ints, numbers, waves, basis, signals, constants, noise, bounds, count, latest, suspect, scratch_wave
             )
-            if found != NONE:
-                found = found if numbers[suspect + ROOT] <= horizon else NONE
+            if falling != NONE:
+                falling = falling if numbers[suspect + ROOT] <= horizon else NONE
                 break
-        step = sample_distance(numbers, constants, bounds, count, until - begin)
-        known, before = 1 if step == before else 0, step
-        searched += 1
-        if searched > PATIENCE and horizon - begin > MOST_BLOCKS * INTERVALS * step:
+        step = sample_distance(numbers, constants, bounds, count, window_end - begin)
+        has_factors, previous_step = 1 if step == previous_step else 0, step
+        blocks += 1
+        if blocks > PATIENCE and horizon - begin > MOST_BLOCKS * INTERVALS * step:
             numbers[result + 2] = step
             numbers[result + 3] = horizon - begin
             return TOO_LONG
-        found = descent_in_block(
-            ints, numbers, waves, basis, signals, constants, noise, bounds, count, begin, step, horizon, known,
+        falling = descent_in_block(
+            ints, numbers, waves, basis, signals, constants, noise, bounds, count, begin, step, horizon, has_factors,
             suspect, scratch_wave,
         )  # fmt: skip
         begin += INTERVALS * step
     numbers[result + 1] += numbers[suspect + SAMPLES]
-    if found != NONE:
+    if falling != NONE:
         numbers[result] = numbers[suspect + ROOT]
-    return found
+    return falling
 
 
 @compiled
@@ -152,16 +152,16 @@ def simultaneous(
     signals: int,
     constants: int,
     count: int,
-    found: int,
+    first: int,
     time: float,
     scratch_wave: int,
     result: int,
 ) -> int:
-    """How many signals reach zero, falling, at the first descent of ``found``, itself among them; which, as 1, in ints.
+    """Return the number of signals that reach zero, falling, at the first descent of ``first``, and flag them in ints.
 
-    One whose slope is round-off does not fall: it may be zero for as long as another one holds it there.
+    A signal whose slope is round-off does not fall: another contact may keep it at zero.
 
-    scratch_wave: p waves. result: where (count,) ints begin.
+    scratch_wave: p waves. result: offset of the flags (count,) in the ints.
     """
     p, powers, rates, scales = ints[basis + SIZE], ints[basis + POWERS], ints[basis + RATES], ints[basis + SCALES]
     exponentials(ints, numbers, waves, basis, time, time, scratch_wave)
@@ -178,9 +178,9 @@ def simultaneous(
             steepest += size * magnitude(waves, rates + j)
             if ints[powers + j] > 0:
                 slope += ints[powers + j] / numbers[scales] * (a * waves[scratch_wave + j - 1]).real
-        soon = max(ZERO * terms, -slope * instant)
-        falls = terms > 0.0 and slope < -ZERO * steepest and value <= min(SIMULTANEOUS * terms, soon)
-        ints[result + s] = 1 if s == found or falls else 0
+        allowed = max(ZERO * terms, -slope * instant)
+        falls = terms > 0.0 and slope < -ZERO * steepest and value <= min(SIMULTANEOUS * terms, allowed)
+        ints[result + s] = 1 if s == first or falls else 0
         total += ints[result + s]
     return total
 
@@ -198,10 +198,10 @@ def first_sign(
     scratch: int,
     scratch_wave: int,
 ) -> int:
-    """+1 or -1 as a signal is, or becomes at once, positive or negative at t = 0; 0 if it vanishes.
+    """Return the sign of a signal just after t = 0, +1 or -1; 0 if it vanishes.
 
-    By the first derivative, from the order ``since`` on, that is not round-off of its terms. sizes: of which terms (p,)
-    the coefficients are sums, in the numbers. scratch, scratch_wave: p numbers and p waves.
+    It is the sign of the first derivative, of order ``since`` or more, that is not round-off of its terms. sizes:
+    offset of the sums of |terms| (p,) of the coefficients. scratch, scratch_wave: p working numbers and waves.
     """
     p, powers, rates, unit = (
         ints[basis + SIZE],
