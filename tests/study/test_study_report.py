@@ -22,7 +22,7 @@ from multiphi_exudyn.study.accuracy.study_figures import (
     response_figure,
     styles,
 )
-from multiphi_exudyn.study.accuracy.study_findings import error_words, findings, shown_points
+from multiphi_exudyn.study.accuracy.study_findings import error_text, findings, shown_points
 from multiphi_exudyn.study.accuracy.study_report import render_study
 from multiphi_exudyn.study.comparison.wording import percent
 
@@ -114,9 +114,9 @@ def test_what_lies_below_the_uncertainty_is_told_as_that():
     given = result_of([row("reference"), row("coarser", 0.03), row("a", 0.02)], [timing("a", 1.0)])
     assert "Which settings are within 2 %, 1 % is not decided here." in " ".join(findings(given)["distrust"])
     assert findings(given)["outcome"][-1] == "The most accurate is a: ≤ 3.00 % (uncertainty)."
-    assert error_words(0.04, 0.03) == "4.00 %"
-    assert error_words(None, 0.03) == "–"
-    assert error_words(0.02, None) == "2.00 %"
+    assert error_text(0.04, 0.03) == "4.00 %"
+    assert error_text(None, 0.03) == "–"
+    assert error_text(0.02, None) == "2.00 %"
 
 
 def test_without_a_full_model_that_holds_the_tolerance_nothing_is_called_faster():

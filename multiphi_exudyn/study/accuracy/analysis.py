@@ -14,7 +14,7 @@ import pandas as pd
 from multiphi_exudyn.study.accuracy.study_file import COARSER, REFERENCE, is_number
 from multiphi_exudyn.study.accuracy.study_result import StudyResult, worst_judged
 from multiphi_exudyn.study.comparison.wording import seconds
-from multiphi_exudyn.study.running.runner import modes_words
+from multiphi_exudyn.study.running.runner import modes_text
 from multiphi_exudyn.study.sweep.row import key_of
 
 __all__ = [
@@ -170,7 +170,7 @@ def _coarser(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
 
 def _word(field: str, value: Any) -> str:
     if field == "modes":
-        return modes_words(value)
+        return modes_text(value)
     if field == "elements":
         return f"{value} elements"
     if field == "step":

@@ -29,7 +29,7 @@ from multiphi_exudyn.study.comparison.run_warnings import run_warnings
 from multiphi_exudyn.study.comparison.wording import percent
 from multiphi_exudyn.study.sweep.row import Row
 
-__all__ = ["error_words", "findings", "records", "shown_points", "study_warnings"]
+__all__ = ["error_text", "findings", "records", "shown_points", "study_warnings"]
 
 TEMPLATE = "findings.txt.j2"
 MOST_POINTS = 6  # of the scene's axes that pictures and tables are shown for
@@ -54,7 +54,7 @@ def findings(result: StudyResult) -> dict[str, tuple[str, ...]]:
         label=next((row.values.get("label") for row in result.rows if row.parameters["method"] == REFERENCE), None),
         explained=sum(_explained(row) for row in result.budgets),
         named=named,
-        error_words=error_words,
+        error_text=error_text,
         warned=study_warnings(result),
         **_at_one_point(result),
         **_uncertainties(result),
@@ -67,7 +67,7 @@ def study_warnings(result: StudyResult) -> list[str]:
     """What the models warn of, a sentence for each kind, and how long their runs are determined."""
     rows = [row for row in (*result.rows, *result.budgets) if row.status == "ok"]
     several = len(points(result)) > 1
-    runs = [(_run_words(row.parameters, several), _warnings(row)) for row in rows]
+    runs = [(_run_text(row.parameters, several), _warnings(row)) for row in rows]
     own = settings(result)
     horizons = [
         (named(method, setting), measures.get("horizon_s", {}))
@@ -82,7 +82,7 @@ def shown_points(result: StudyResult) -> list[Mapping[str, Any]]:
     return (timed or points(result))[:MOST_POINTS]
 
 
-def error_words(error: float | None, own: float | None) -> str:
+def error_text(error: float | None, own: float | None) -> str:
     """An error; one below the reference's own uncertainty only as that."""
     if error is not None and own is not None and error <= own:
         return f"≤ {percent(own)} (uncertainty)"
@@ -95,7 +95,7 @@ def records(table: pd.DataFrame) -> list[dict[str, Any]]:
     return [{str(name): value for name, value in line.items()} for line in found]
 
 
-def _run_words(parameters: Mapping[str, Any], several: bool) -> str:
+def _run_text(parameters: Mapping[str, Any], several: bool) -> str:
     """A run, in words of its own; several: whether it has its point of the scene's axes in them."""
     at = parameters["at"] if several else {}
     near = "".join(f", {field} × {factor:g}" for field, factor in parameters["nearby"].items())

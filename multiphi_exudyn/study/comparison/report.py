@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import pandas as pd
 
 from multiphi_exudyn.study.comparison import plots
-from multiphi_exudyn.study.comparison.compare import LISTED, Comparison
+from multiphi_exudyn.study.comparison.compare import MOST_LISTED, Comparison
 from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.mode_shapes import LevelModes, mode_figure
 from multiphi_exudyn.study.comparison.pages import Picture, environment_of
@@ -74,7 +74,7 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Mapping
             errors=_errors(comparison),
             stiff_errors=_stiff_errors(comparison, comparison.stiff) if comparison.stiff and comparison.rigid else None,
             pictures=pictures,
-            totals=contact_totals(comparison) if len(bench.mechanics.contacts) > LISTED else None,
+            totals=contact_totals(comparison) if len(bench.mechanics.contacts) > MOST_LISTED else None,
             zoom=histories_to_zoom(comparison),
             contradiction=contradiction,
         )
@@ -90,7 +90,7 @@ def contact_totals(comparison: Comparison) -> pd.DataFrame:
 
 def _totals(run: ModelRun, t_end: float) -> dict[str, object]:
     counts = [len(given) for given in run.contact_intervals.values()]
-    held = metrics.held_levels(run.contact_intervals, t_end)
+    held = metrics.level_durations(run.contact_intervals, t_end)
     together = metrics.union(run.contact_intervals.values())
     first = metrics.first_contact(together)
     return {
@@ -114,7 +114,7 @@ def _errors(comparison: Comparison) -> pd.DataFrame:
     lines = {}
     for name, run in comparison.measured.items():
         agreement = {("agreement horizon", share(each)): until(comparison.horizon(run, each)) for each in tolerances}
-        nudged = {each: until(run.horizon_s.get(each)) for each in comparison.nudged}
+        nudged = {each: until(run.horizon_s.get(each)) for each in comparison.horizon_tolerances}
         own = {("sensitivity horizon", share(float(each))): told for each, told in nudged.items()}
         lines[name] = _by_window(comparison.errors(run)) | agreement | own
     return pd.DataFrame(lines).T
@@ -141,7 +141,7 @@ def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterator[
             yield "histories", Picture.of(plots.history_figure(comparison, point), HISTORY.format(point, detail))
         cost = COST.format(HOLLOW if comparison.rigid else "")
         yield "cost", Picture.of(plots.error_time_figure(comparison), cost)
-        if len(reference.contact_intervals) > LISTED:
+        if len(reference.contact_intervals) > MOST_LISTED:
             yield "contact", Picture.of(plots.many_contacts_figure(comparison), MANY)
         else:
             for contact in reference.contact_intervals:

@@ -12,7 +12,7 @@ from multiphi_exudyn.exudyn_plugin import BodyHistories
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.study.running.runner import Runner
-from multiphi_exudyn.study.running.runs import interval_array, way
+from multiphi_exudyn.study.running.runs import interval_array, path_length
 from reference_models.body_alone import solve_body_alone
 
 __all__ = ["BodyRunner"]
@@ -25,7 +25,7 @@ class BodyRunner(Runner):
 
     @property
     def label(self) -> str:
-        levels = f"{self.level_words()}, r = {self.spec.modes}{self.printed_words()}"
+        levels = f"{self.level_text()}, r = {self.spec.modes}{self.printed_text()}"
         return f"Exudyn user object, {levels}, step {self.spec.step * 1e6:g} µs"
 
     @property
@@ -65,7 +65,7 @@ class BodyRunner(Runner):
         rows = ["impact", "truncation_kinetic", "truncation_strain", *(["friction"] if answer.slip else [])]
         lost = {row: float(sum(getattr(event.loss, row) for event in answer.events)) for row in rows}
         for friction in self.bench.mechanics.frictions:
-            lost["friction"] += friction.limit * way(answer.slip[friction.name])
+            lost["friction"] += friction.limit * path_length(answer.slip[friction.name])
         for contact in self.bench.mechanics.contacts:
             if contact.friction:
                 force, slip = answer.friction_force[contact.name], answer.slip[contact.name]

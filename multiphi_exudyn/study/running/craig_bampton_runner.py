@@ -27,7 +27,7 @@ from reference_models.point_contact import PointContact
 
 __all__ = ["CraigBamptonRunner"]
 
-FINER = 10  # samples of a gap for each recorded one, between which its crossings are interpolated
+GAP_SAMPLES = 10  # samples of a gap for each recorded one, between which its crossings are interpolated
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Component:
 class CraigBamptonRunner(Runner):
     """Reduce, solve, sample; a run that gains energy has failed, as a full one has."""
 
-    in_steps = True
+    may_gain_energy = True
 
     @property
     def label(self) -> str:
@@ -89,7 +89,7 @@ class CraigBamptonRunner(Runner):
         structure, shapes = self.bench.structure, prepared.component.shapes
         motion = CubicHermiteSpline(answer.time, answer.coordinates, answer.velocities)
         on_grid = motion(self.bench.time)
-        fine = np.linspace(0.0, self.bench.t_end, FINER * (len(answer.time) - 1) + 1)
+        fine = np.linspace(0.0, self.bench.t_end, GAP_SAMPLES * (len(answer.time) - 1) + 1)
         fields: dict[str, Any] = {
             "points": {name: on_grid @ (structure.row(name) @ shapes) for name in self.bench.points},
             "energy_time": answer.time,

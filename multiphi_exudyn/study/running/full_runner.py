@@ -19,7 +19,7 @@ from reference_models.gentler import Attempt, attempts
 
 __all__ = ["FullRunner"]
 
-STILL = 1e-6  # of the range of its way: a patch that moves less from sample to sample sticks
+STICK_DISTANCE = 1e-6  # of the range of its way: a patch that moves less from sample to sample sticks
 
 
 class FullRunner(Runner):
@@ -113,6 +113,6 @@ def _message(tried: Sequence[Attempt]) -> str:
 
 def _sticking(time: np.ndarray, slip: np.ndarray) -> np.ndarray:
     """When (m, 2) [s] a patch, whose way (k,) is known on a grid, stays where it is."""
-    still = np.abs(np.diff(slip)) <= STILL * np.ptp(slip)
+    still = np.abs(np.diff(slip)) <= STICK_DISTANCE * np.ptp(slip)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
     return np.asarray(time[edges].reshape(-1, 2))

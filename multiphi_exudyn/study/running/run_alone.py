@@ -20,7 +20,7 @@ from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
 __all__ = ["run_alone"]
 
-OURS = "multiphi_exudyn"
+PACKAGE = "multiphi_exudyn"
 
 
 def run_alone(of_model: dict[str, Any], of_run: dict[str, Any]) -> dict[str, Any]:
@@ -32,14 +32,14 @@ def run_alone(of_model: dict[str, Any], of_run: dict[str, Any]) -> dict[str, Any
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     imported = [name.partition(".")[0] for name in sys.modules]
-    others = {name for name in packages_distributions() if not name.startswith("_")} - {OURS}
+    others = {name for name in packages_distributions() if not name.startswith("_")} - {PACKAGE}
     return {
         "status": run.status,
         "levels_built": run.stats.levels_built,
         "levels_possible": run.stats.levels_possible,
         "dofs_carried": max(segment.level.level.modes for segment in run.segments) if run.segments else 0,
         "dofs_given": model.structure.n,
-        "modules": imported.count(OURS),
+        "modules": imported.count(PACKAGE),
         "packages": sorted(others & set(imported)),
         "memory": peak,
         "warnings": list(run.warnings),

@@ -16,10 +16,10 @@ import numpy as np
 from multiphi_exudyn.mathematics.compiling.compiled import available, compile_entries
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.running.timing import repeated, timed
-from multiphi_exudyn.study.scene.workbench import Workbench, start_of
+from multiphi_exudyn.study.scene.workbench import Workbench, start_equilibrium
 from reference_models.full_run import ENERGY_GAIN, EnergyBalance
 
-__all__ = ["ENERGY_INTERVAL", "Runner", "modes_words"]
+__all__ = ["ENERGY_INTERVAL", "Runner", "modes_text"]
 
 ENERGY_INTERVAL = 1e-3  # s, between samples of the energy
 
@@ -29,7 +29,7 @@ class Runner(ABC):
     """One model of a scene as it is run. spec: its entry; the others: see ``run_model``."""
 
     compiled: ClassVar[bool] = False  # whether its own loop is
-    in_steps: ClassVar[bool] = False  # whether it may gain energy, which nothing in a released structure gives
+    may_gain_energy: ClassVar[bool] = False  # whether it may gain energy, which nothing in a released structure gives
 
     bench: Workbench
     spec: Any
@@ -45,7 +45,7 @@ class Runner(ABC):
     def prepare(self) -> Any:
         """What is done offline: the Multi-Phi model and its start, unless a kind needs something else."""
         model = self.bench.model(self.spec)
-        return model, start_of(self.bench, model)
+        return model, start_equilibrium(self.bench, model)
 
     @abstractmethod
     def solve(self, prepared: Any) -> tuple[Any, float]:
@@ -84,22 +84,22 @@ class Runner(ABC):
         histories, sampling = timed(lambda: self.histories(prepared, answer))
         fields: dict[str, Any] = {"time": self.bench.time, "sampling_s": sampling}
         whole = replace(run, **fields | histories)
-        gained = _energy_gain(whole) if self.in_steps else ""
+        gained = _energy_gain(whole) if self.may_gain_energy else ""
         return replace(run, status="failed", message=gained) if gained else whole
 
-    def level_words(self) -> str:
+    def level_text(self) -> str:
         """Which levels a model has, as part of its label."""
         contacts = self.bench.contacts(self.spec.rigid)
         if not contacts:
             return "levels of force laws" if self.bench.mechanics.force_laws else "levels of friction"
         return f"{'rigid' if all(contact.rigid for contact in contacts) else 'compliant'} levels"
 
-    def printed_words(self) -> str:
+    def printed_text(self) -> str:
         """That levels have printed frequencies, as part of a label."""
         return ", printed frequencies" if self.bench.overrides else ""
 
 
-def modes_words(modes: object) -> str:
+def modes_text(modes: object) -> str:
     """How many modes a model has: "r = 12", "all modes"."""
     return "all modes" if modes == "all" else f"r = {modes}"
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
-from multiphi_exudyn.study.running.runner import ENERGY_INTERVAL, Runner, modes_words
+from multiphi_exudyn.study.running.runner import ENERGY_INTERVAL, Runner, modes_text
 from multiphi_exudyn.study.running.runs import interval_array
 from multiphi_exudyn.study.running.timing import timed
 from multiphi_exudyn.study.scene.workbench import start_configuration
@@ -24,10 +24,10 @@ from reference_models.stepwise import StepwiseHistories, StepwiseRun, solve_step
 __all__ = ["SplittingRunner", "StepwiseRunner"]
 
 
-class _InSteps(Runner):
+class _StepRunner(Runner):
     """A method whose answer gives histories of points at any times."""
 
-    in_steps = True
+    may_gain_energy = True
 
     def sampler(self, answer: Any) -> Callable[[Sequence[str], np.ndarray], StepwiseHistories]:
         """What gives the histories of points at times (k,) [s]."""
@@ -50,13 +50,13 @@ class _InSteps(Runner):
         }
 
 
-class StepwiseRunner(_InSteps):
+class StepwiseRunner(_StepRunner):
     """The reduced equations of a Multi-Phi model by solve_ivp."""
 
     @property
     def label(self) -> str:
         method = f"{self.spec.method}, rtol {self.spec.rtol:g}"
-        return f"solve_ivp, {method}, compliant levels, {modes_words(self.spec.modes)}"
+        return f"solve_ivp, {method}, compliant levels, {modes_text(self.spec.modes)}"
 
     def solve(self, prepared: tuple[MultiPhiModel, Equilibrium]) -> tuple[StepwiseRun, float]:
         model, start = prepared
@@ -72,7 +72,7 @@ class StepwiseRunner(_InSteps):
         }
 
 
-class SplittingRunner(_InSteps):
+class SplittingRunner(_StepRunner):
     """A Craig-Bampton component by Strang splitting; an explosion is a failed run."""
 
     compiled = True

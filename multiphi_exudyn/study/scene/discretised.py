@@ -21,7 +21,7 @@ from reference_models.full_beam import FullBeam, FullBeamSettings
 
 __all__ = ["LinearBeams", "Mesh", "discretised"]
 
-KEPT = 32  # discretised beams kept for later scenes; each is a few matrices of some 100 DoFs
+CACHE_SIZE = 32  # discretised beams kept for later scenes; each is a few matrices of some 100 DoFs
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class LinearBeams:
         return np.asarray(np.linalg.solve(self.structure.mass, inertia))
 
 
-@functools.lru_cache(maxsize=KEPT)
+@functools.lru_cache(maxsize=CACHE_SIZE)
 def discretised(mesh: Mesh) -> tuple[FullBeam | LinearBeams, float]:
     """The beams without contacts, and what it took to make them the first time [s]."""
     started = time.perf_counter()

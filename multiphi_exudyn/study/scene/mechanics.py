@@ -17,7 +17,7 @@ from multiphi_exudyn.study.scene.fields import Table, inside
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, StopMotionSpec
 from multiphi_exudyn.study.scene.parts import Mechanics
 from multiphi_exudyn.study.scene.scene_file import SceneFile
-from multiphi_exudyn.study.scene.scene_loads import described_loads, loads_of
+from multiphi_exudyn.study.scene.scene_loads import load_phrases, loads_of
 from multiphi_exudyn.study.scene.scenes import Scene, refuse
 
 __all__ = ["mechanics_of"]
@@ -28,17 +28,17 @@ OF_POINTS = ("load_at", "measured_at", "points", "judged_points", "direction", "
 def mechanics_of(scene: Scene) -> Mechanics:
     """Build and check what ``scene`` describes; raises MultiPhiValueError naming file and field."""
     file = scene.file
-    structure = inside(f"{scene.path}: structure", lambda: file.structure.built(scene.path.parent))
+    structure = inside(f"{scene.path}: structure", lambda: file.structure.build(scene.path.parent))
     contacts = [
-        inside(f"{scene.path}: contacts[{i}]", spec.built) for i, row in enumerate(file.contacts) for spec in row.row
+        inside(f"{scene.path}: contacts[{i}]", spec.build) for i, row in enumerate(file.contacts) for spec in row.row
     ]
     mechanics = replace(
         structure,
         contacts=(*structure.contacts, *contacts),
-        force_laws=tuple(inside(f"{scene.path}: force_laws[{i}]", s.built) for i, s in enumerate(file.force_laws)),
-        frictions=tuple(inside(f"{scene.path}: friction[{i}]", s.built) for i, s in enumerate(file.friction)),
+        force_laws=tuple(inside(f"{scene.path}: force_laws[{i}]", s.build) for i, s in enumerate(file.force_laws)),
+        frictions=tuple(inside(f"{scene.path}: friction[{i}]", s.build) for i, s in enumerate(file.friction)),
         loads=file.loads,
-        damping=structure.damping if file.damping is None else file.damping.built(),
+        damping=structure.damping if file.damping is None else file.damping.build(),
         assumptions=(*structure.assumptions, *(_assumptions(file) if structure.parameter_set else ())),
     )
     _check_points(scene, mechanics)
@@ -56,13 +56,13 @@ def _assumptions(file: SceneFile) -> Iterator[str]:
     """What a scene adds to the rig's own assumptions."""
     start = file.start
     if start is not None:
-        given = f"{start.in_words()} by a static force at {start.load_at}"
+        given = f"{start.phrase()} by a static force at {start.load_at}"
         yield f"start of this scene: {given} (assumed: no number is printed)"
     for law in file.force_laws:
-        yield f"force law of this scene: {law.in_words()} (assumed: the paper's rig has none)"
+        yield f"force law of this scene: {law.phrase()} (assumed: the paper's rig has none)"
     for friction in file.friction:
-        yield f"friction of this scene: {friction.in_words()} (assumed: the paper's rig has none)"
-    for load in described_loads(file.loads):
+        yield f"friction of this scene: {friction.phrase()} (assumed: the paper's rig has none)"
+    for load in load_phrases(file.loads):
         yield f"load of this scene: {load} (assumed: the paper's rig is only released)"
     stiffness = getattr(file.structure, "support_stiffness", math.inf)
     if math.isfinite(stiffness):
@@ -115,7 +115,7 @@ def _check_names(scene: Scene, mechanics: Mechanics) -> None:
 
 def _check_printed(scene: Scene, mechanics: Mechanics) -> None:
     """Printed frequencies are those of a rigid clamp and of a rigid support, and say nothing of others."""
-    if not mechanics.printed:
+    if not mechanics.has_printed_frequencies:
         return
     if mechanics.force_laws:
         refuse(scene, "force_laws[0].name", mechanics.force_laws[0].name, "none: the printed frequencies have no law")

@@ -40,13 +40,13 @@ class Mechanics:
     loads: tuple[LoadSpec, ...] = ()
 
     @property
-    def rubbing(self) -> tuple[str, ...]:
+    def friction_names(self) -> tuple[str, ...]:
         """Names of what has a friction force: frictions, and contacts with friction."""
         contacts = [contact.name for contact in self.contacts if contact.friction]
         return (*(friction.name for friction in self.frictions), *contacts)
 
     @property
-    def printed(self) -> bool:
+    def has_printed_frequencies(self) -> bool:
         """Whether levels have printed frequencies in place of their own."""
         return self.parameter_set is not None and bool(published_override(self.parameter_set))
 
@@ -69,12 +69,12 @@ class Mechanics:
         return None if self.beams is None else self.beams.only
 
     @property
-    def directions(self) -> int:
+    def direction_count(self) -> int:
         """How many modes a level has less than the structure has DoFs: one for each contact, force law and friction."""
         return len(self.contacts) + len(self.force_laws) + len(self.frictions)
 
     @property
-    def carried(self) -> bool:
+    def needs_rigid_body_motion(self) -> bool:
         """Whether a load acts along a rigid-body motion of the structure: its weight, or a moving base."""
         return any(isinstance(load, (GravitySpec, BaseMotionSpec)) for load in self.loads)
 

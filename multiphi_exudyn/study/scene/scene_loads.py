@@ -17,7 +17,7 @@ from multiphi_exudyn.mechanics.samples import Sampled
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.mechanics.time_functions import Harmonic, Sweep, TimeFunction
-from multiphi_exudyn.study.scene.fields import inside, place_in_words
+from multiphi_exudyn.study.scene.fields import inside, place_phrase
 from multiphi_exudyn.study.scene.load_tables import (
     BaseMotionSpec,
     ConstantLoadSpec,
@@ -32,7 +32,7 @@ from multiphi_exudyn.study.scene.load_tables import (
 )
 from multiphi_exudyn.study.scene.scenes import Scene, refuse
 
-__all__ = ["described_loads", "loads_of"]
+__all__ = ["load_phrases", "loads_of"]
 
 FORCES: dict[str, Callable[..., Load]] = {"constant": ConstantLoad, "harmonic": HarmonicLoad, "sweep": SweepLoad}
 COURSES: dict[str, Callable[..., TimeFunction]] = {"harmonic": Harmonic, "sweep": Sweep}
@@ -47,9 +47,9 @@ def loads_of(scene: Scene, transverse: np.ndarray | None) -> tuple[Load, ...]:
     return tuple(_load(scene, f"loads[{i}]", spec, transverse) for i, spec in enumerate(scene.file.loads))
 
 
-def described_loads(loads: Sequence[LoadSpec]) -> tuple[str, ...]:
+def load_phrases(loads: Sequence[LoadSpec]) -> tuple[str, ...]:
     """Every load in words, as parts of a sentence."""
-    return tuple(map(_described, loads))
+    return tuple(map(_phrase, loads))
 
 
 def _load(scene: Scene, field: str, spec: LoadSpec, transverse: np.ndarray | None) -> Load:
@@ -85,20 +85,20 @@ def _samples(scene: Scene, field: str, spec: SampledCourse) -> Sampled:
     return inside(f"{scene.path}: {field}", lambda: Sampled.from_csv(scene.path.parent / str(spec.csv), spec.column))
 
 
-def _described(spec: LoadSpec) -> str:
+def _phrase(spec: LoadSpec) -> str:
     if isinstance(spec, GravitySpec):
         return f"a weight of {spec.acceleration:+g} m/s²"
     if isinstance(spec, BaseMotionSpec):
         left = f", which {' and '.join(spec.fixed_stops)} does not follow" if spec.fixed_stops else ""
-        return f"a base that moves by {_in_words(spec.course, 'm')}{left}"
+        return f"a base that moves by {_course_phrase(spec.course, 'm')}{left}"
     if isinstance(spec, StopMotionSpec):
-        return f"a stop of {spec.contact} that moves by {_in_words(spec.course, 'm')}"
+        return f"a stop of {spec.contact} that moves by {_course_phrase(spec.course, 'm')}"
     if isinstance(spec, ConstantLoadSpec):
-        return f"a constant force of {spec.force:+g} N at {place_in_words(spec.at)}"
-    return f"a force at {place_in_words(spec.at)} of {_in_words(spec, 'N')}"
+        return f"a constant force of {spec.force:+g} N at {place_phrase(spec.at)}"
+    return f"a force at {place_phrase(spec.at)} of {_course_phrase(spec, 'N')}"
 
 
-def _in_words(spec: CourseSpec, unit: str) -> str:
+def _course_phrase(spec: CourseSpec, unit: str) -> str:
     if isinstance(spec, HarmonicCourse):
         return f"{spec.amplitude:g} {unit}, harmonic at {spec.frequency_hz:g} Hz"
     if isinstance(spec, SweepCourse):

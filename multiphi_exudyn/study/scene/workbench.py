@@ -41,10 +41,10 @@ from reference_models.craig_bampton import independent_points
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import published_override
 
-__all__ = ["ELEMENTS", "ROUND_OFF", "Workbench", "mesh_nodes", "prepare", "start_configuration", "start_of"]
+__all__ = ["ELEMENTS", "ROUND_OFF", "Workbench", "mesh_nodes", "prepare", "start_configuration", "start_equilibrium"]
 
 START_TOLERANCE = 1e-13  # of the force, between the last two steps of the search for it
-REACHED = 1e-9  # of the displacement asked for; the full models are held to the same
+START_ERROR = 1e-9  # of the displacement asked for; the full models are held to the same
 REPEATS = 7
 ROUND_OFF = 1 - 1e-9  # of the end of the run: a window nearer to it is the whole run
 ELEMENTS = 57  # of a beam that no full model of the scene discretises; the paper's model has as many
@@ -124,7 +124,7 @@ class Workbench:
     @functools.cached_property
     def loads(self) -> tuple[Load, ...]:
         """The scene's loads on its structure."""
-        along = self.mechanics.beams is not None and self.mechanics.carried
+        along = self.mechanics.beams is not None and self.mechanics.needs_rigid_body_motion
         return loads_of(self.scene, discretised(_mesh(self.scene, self.mechanics))[0].transverse if along else None)
 
     def loads_on(self, beam: FullBeam) -> tuple[Load, ...]:
@@ -169,10 +169,10 @@ def prepare(scene: Scene, mechanics: Mechanics) -> Workbench:
 
 def start_configuration(bench: Workbench, model: MultiPhiModel) -> np.ndarray:
     """x (n,) at rest under the scene's static load, with the right contacts of ``model`` closed; zero without one."""
-    return start_of(bench, model).displacement
+    return start_equilibrium(bench, model).displacement
 
 
-def start_of(bench: Workbench, model: MultiPhiModel) -> Equilibrium:
+def start_equilibrium(bench: Workbench, model: MultiPhiModel) -> Equilibrium:
     """The same, with the stretches of friction's springs under a load that has been applied slowly."""
     start = bench.scene.file.start
     if start is None:
@@ -190,7 +190,7 @@ def start_of(bench: Workbench, model: MultiPhiModel) -> Equilibrium:
         return float(reached / start.displacement - 1)
 
     root = scipy.optimize.root_scalar(miss, method="secant", x0=0.0, x1=1.0, xtol=START_TOLERANCE)
-    if not (root.converged and abs(miss(root.root)) <= REACHED):
+    if not (root.converged and abs(miss(root.root)) <= START_ERROR):
         raise NumericalFailure(
             f"start: no force at {start.load_at} moves {start.measured_at} by {start.displacement:g} m"
         )
@@ -215,7 +215,7 @@ def _mesh(scene: Scene, mechanics: Mechanics) -> Mesh:
 
 def _check_modes(bench: Workbench) -> None:
     """No model has more modes than there are."""
-    given = bench.mechanics.directions
+    given = bench.mechanics.direction_count
     most = bench.structure.n - given
     if most < 1:
         raise MultiPhiValueError(

@@ -31,8 +31,8 @@ from multiphi_exudyn.study.stability.brute_force import (
     missed,
     sample_contact,
     sampling,
+    switches_without_event,
     truncated,
-    untold_switches,
 )
 from multiphi_exudyn.study.stability.case import Problem
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
@@ -108,7 +108,7 @@ def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
         residual=residual,
         events=len(trajectory.events),
         missed=sum(untold for _, _, untold in rubbed)
-        + sum(untold_switches(trajectory, table, law.name) for law in problem.laws)
+        + sum(switches_without_event(trajectory, table, law.name) for law in problem.laws)
         + sum(
             missed(trajectory, found, table, contact.name, tolerance)
             for contact, found in zip(parts, seen, strict=True)
@@ -173,4 +173,4 @@ def _rubbed(
     spring = 0.0 if friction.rigid else friction.stiffness
     force -= ROUND_OFF * spring * float(np.max(np.abs(place), initial=0.0))
     way = float(np.max(np.abs(patch - patch[0] - slip)))
-    return way, max(0.0, force) / friction.limit, untold_switches(trajectory, table, name)
+    return way, max(0.0, force) / friction.limit, switches_without_event(trajectory, table, name)

@@ -180,7 +180,7 @@ def _check(connection: sqlite3.Connection) -> None:
         raise _Damaged(f"{count} runs where the last one has the number {last}")
 
 
-def _tell_lost(path: Path, log: Log, connection: sqlite3.Connection) -> None:
+def _warn_lost(path: Path, log: Log, connection: sqlite3.Connection) -> None:
     """Warn of transactions of a log, as it was before the file was opened, that SQLite has not taken."""
     _, read, _ = connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
     page = connection.execute("PRAGMA page_size").fetchone()[0]
@@ -231,7 +231,7 @@ def _opened(path: Path) -> sqlite3.Connection:
                 versions = ", ".join(str(version) for (version,) in found)
                 raise _unusable(path, f"has format {versions or 'none'}, this version reads {FORMAT}")
             _check(connection)
-            _tell_lost(path, log, connection)
+            _warn_lost(path, log, connection)
         except BaseException:
             connection.close()
             raise
