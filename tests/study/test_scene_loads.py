@@ -185,7 +185,7 @@ class TestReport:
 
     def test_the_loads_are_told_where_the_start_is(self, comparison):
         told = " ".join(findings(comparison)["compared"])
-        assert "It starts straight and at rest. From t = 0 on it is driven by a force at tip of 2 N, " in told
+        assert "It starts undeformed and at rest. From t = 0 on it is driven by a force at tip of 2 N, " in told
         assert "harmonic at 12 Hz and a weight of -9.81 m/s²" in told
         assert "released" not in told
 

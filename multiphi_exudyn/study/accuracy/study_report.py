@@ -39,26 +39,26 @@ __all__ = ["render_study"]
 TEMPLATE = "study.html.j2"
 MOST_FAILURES = 100  # listed on the page; the CSV file has all
 PARETO = (
-    "A line joins those settings of a method that none of its other settings beats in both time and error. In the "
-    "grey band a model is as good as the reference can tell. Thin lines: the tolerances of the table below. "
+    "The line of a method joins its Pareto-optimal settings: no other setting is better in both time and error. Errors "
+    "in the grey band are below the uncertainty of the reference. Thin lines: the tolerances of the table below. "
     "Colours are the same in all pictures."
 )
 CONVERGENCE = (
-    "In brackets: the other fields, each at its finest. Order: observed between neighbouring values. ×: failed."
+    "In brackets: the other fields, each at its finest value. Order: observed between neighbouring values. ×: failed."
 )
-ALONG = "Every method at its finest setting; gaps: failed."
-RESPONSE = "The reference, at the points of the scene's axes."
+ALONG = "Every method at its finest setting; a gap in a line is a failed run."
+RESPONSE = "Response of the reference at the points of the scene's axes."
 INDICATOR = (
-    "Every run that has an indicator, nearby ones included. On the line the prediction is exact. It predicts what "
-    "truncation costs, not what a contact law other than the reference's does."
+    "All runs with an indicator, nearby ones included. On the line the prediction is exact. The indicator predicts the "
+    "error of modal truncation, not that of a contact law other than the reference's."
 )
 BUDGET = (
     "Bars: size of each part, whiskers its uncertainty, numbers its share of the whole difference in %. "
     "Pale: no larger than its uncertainty. Dashed line: the whole difference between full and reduced."
 )
 MAPS = (
-    "The reference and {}. Dashed: natural frequencies of the levels [Hz]. Hatched: the ends of the record show. "
-    "Grey bars on top: in contact."
+    "The reference and {}. Dashed: natural frequencies of the levels [Hz]. Hatched: affected by the ends of the "
+    "record. Grey bars on top: in contact."
 )
 
 

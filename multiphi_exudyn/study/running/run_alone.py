@@ -1,7 +1,7 @@
-"""One reduced run in a process of its own, which tells what it took: ``python -m ...run_alone FILE``.
+"""One reduced run in a process of its own, which prints what it used: ``python -m ...run_alone FILE``.
 
 FILE holds a pickled task: the arguments of MultiPhiModel and those of simulate. Nothing but the reduced model is
-imported here, so that the modules and the memory told are those that a run needs.
+imported here, so that the printed modules and memory are those that a run needs.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ __all__ = ["run_alone"]
 PACKAGE = "multiphi_exudyn"
 
 
-def run_alone(of_model: dict[str, Any], of_run: dict[str, Any]) -> dict[str, Any]:
-    """What the run took, as ``needs.Needs`` names it; memory counted from before its model is made."""
+def run_alone(model_arguments: dict[str, Any], run_arguments: dict[str, Any]) -> dict[str, Any]:
+    """Resources used by the run, with the names of ``needs.Needs``; memory includes that of the model."""
     tracemalloc.start()
-    model = MultiPhiModel(**of_model)
+    model = MultiPhiModel(**model_arguments)
     with kept_back():
-        run = simulate(model, **of_run)
+        run = simulate(model, **run_arguments)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     imported = [name.partition(".")[0] for name in sys.modules]

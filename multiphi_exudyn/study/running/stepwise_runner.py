@@ -1,7 +1,7 @@
-"""Runs models that take steps outside Exudyn: the reduced equations through scipy's solve_ivp, and a Craig-Bampton
+"""Run models with time steps outside Exudyn: the reduced equations through scipy's solve_ivp, and a Craig-Bampton
 component by exact free motion with penalty forces in between (reference_models/splitting.py).
 
-A step size control that is asked for too little can feed energy to the highest modes; such a run has failed.
+Step size control with a loose tolerance can add energy to the highest modes; such a run has failed.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ __all__ = ["SplittingRunner", "StepwiseRunner"]
 
 
 class _StepRunner(Runner):
-    """A method whose answer gives histories of points at any times."""
+    """Runner of a method whose answer has histories at arbitrary times."""
 
     may_gain_energy = True
 
     def sampler(self, answer: Any) -> Callable[[Sequence[str], np.ndarray], StepwiseHistories]:
-        """What gives the histories of points at times (k,) [s]."""
+        """Return the function that evaluates histories of points at times (k,) [s]."""
         return answer.histories
 
     def histories(self, prepared: Any, answer: StepwiseRun | SplittingRun) -> dict[str, Any]:
@@ -60,8 +60,8 @@ class StepwiseRunner(_StepRunner):
 
     def solve(self, prepared: tuple[MultiPhiModel, Equilibrium]) -> tuple[StepwiseRun, float]:
         model, start = prepared
-        given = {"method": self.spec.method, "rtol": self.spec.rtol}
-        return timed(lambda: solve_stepwise(model, self.bench.t_end, start.displacement, **given))
+        options = {"method": self.spec.method, "rtol": self.spec.rtol}
+        return timed(lambda: solve_stepwise(model, self.bench.t_end, start.displacement, **options))
 
     def outcome(self, prepared: Any, answer: StepwiseRun) -> dict[str, Any]:
         return {
@@ -73,7 +73,7 @@ class StepwiseRunner(_StepRunner):
 
 
 class SplittingRunner(_StepRunner):
-    """A Craig-Bampton component by Strang splitting; an explosion is a failed run."""
+    """A Craig-Bampton component by Strang splitting; a motion that overflows is a failed run."""
 
     compiled = True
 
@@ -100,6 +100,6 @@ class SplittingRunner(_StepRunner):
         return {
             "dofs": len(prepared[0].squares),
             "status": "ok" if answer.finite else "failed",
-            "message": "" if answer.finite else "its motion has grown beyond all numbers",
+            "message": "" if answer.finite else "its displacements overflow",
             "steps": answer.steps,
         }

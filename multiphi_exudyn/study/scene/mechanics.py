@@ -1,6 +1,6 @@
-"""The mechanics of a scene, built from its tables and checked; and what it rests on beyond what is known.
+"""Build and check the mechanical model of a scene, and list its assumptions.
 
-Errors of the mechanical objects get the file and the field they came from.
+Errors of the mechanical objects are raised with file and field.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def mechanics_of(scene: Scene) -> Mechanics:
     _check_names(scene, mechanics)
     _check_printed(scene, mechanics)
     _check_stops(scene, mechanics)
-    loads_of(scene, None if mechanics.beams is None else np.zeros(0))  # the direction of a beam's is made later
+    loads_of(scene, None if mechanics.beams is None else np.zeros(0))  # the mesh gives the direction for beams later
     for i, model in enumerate(file.models):
         for field, given, needed in model.faults(mechanics):
             refuse(scene, f"models[{i}]{field}" if field.startswith(".") else field, given, needed)
@@ -53,7 +53,7 @@ def mechanics_of(scene: Scene) -> Mechanics:
 
 
 def _assumptions(file: SceneFile) -> Iterator[str]:
-    """What a scene adds to the rig's own assumptions."""
+    """Assumptions of the scene beyond those of the rig."""
     start = file.start
     if start is not None:
         given = f"{start.phrase()} by a static force at {start.load_at}"
@@ -73,14 +73,14 @@ def _assumptions(file: SceneFile) -> Iterator[str]:
 
 
 def _check_points(scene: Scene, mechanics: Mechanics) -> None:
-    """Every point named anywhere in the file is one of the structure's; all that are not are told at once."""
+    """Check that all points named in the file exist; one error lists all unknown ones."""
     file = scene.file
     tables: list[tuple[str, Table | None]] = [("start", file.start), ("outputs", file.outputs)]
     tables += [(f"contacts[{i}]", spec) for i, row in enumerate(file.contacts) for spec in row.row]
     for group in ("friction", "force_laws", "loads"):
         tables += [(f"{group}[{i}]", spec) for i, spec in enumerate(getattr(file, group))]
-    named = [(f"{place}.{field}", name) for place, table in tables for field, name in _named_points(table)]
-    unknown = dict.fromkeys((field, name) for field, name in named if name not in mechanics.points)
+    point_names = [(f"{place}.{field}", name) for place, table in tables for field, name in _named_points(table)]
+    unknown = dict.fromkeys((field, name) for field, name in point_names if name not in mechanics.points)
     faults = [f"{field}: got {name!r}, need {one_of(name, mechanics.points, 'points')}" for field, name in unknown]
     if faults:
         raise MultiPhiValueError(f"{scene.path}: {'; '.join(faults)}")
@@ -89,15 +89,15 @@ def _check_points(scene: Scene, mechanics: Mechanics) -> None:
 def _named_points(table: Table | None) -> Iterator[tuple[str, str]]:
     """(field, name) of every point that a table names."""
     for field in OF_POINTS:
-        given = getattr(table, field, None) or ()
-        if isinstance(given, tuple):
-            yield from ((f"{field}[{i}]", name) for i, name in enumerate(given))
+        value = getattr(table, field, None) or ()
+        if isinstance(value, tuple):
+            yield from ((f"{field}[{i}]", name) for i, name in enumerate(value))
         else:
-            yield from ((field, name) for name in ([given] if isinstance(given, str) else given))
+            yield from ((field, name) for name in ([value] if isinstance(value, str) else value))
 
 
 def _check_names(scene: Scene, mechanics: Mechanics) -> None:
-    """Contacts, force laws and friction have names of their own."""
+    """Check that the names of contacts, force laws and frictions differ."""
     names = [contact.name for contact in mechanics.contacts]
     for name in names:
         if names.count(name) > 1:
@@ -114,7 +114,7 @@ def _check_names(scene: Scene, mechanics: Mechanics) -> None:
 
 
 def _check_printed(scene: Scene, mechanics: Mechanics) -> None:
-    """Printed frequencies are those of a rigid clamp and of a rigid support, and say nothing of others."""
+    """Check that a scene with printed frequencies has a rigid clamp, no force laws and no friction."""
     if not mechanics.has_printed_frequencies:
         return
     if mechanics.force_laws:
@@ -122,17 +122,17 @@ def _check_printed(scene: Scene, mechanics: Mechanics) -> None:
     if mechanics.frictions:
         refuse(scene, "friction[0].name", mechanics.frictions[0].name, "none: the printed frequencies have no friction")
     for name in ("clamp_translation", "clamp_rotation"):
-        given = getattr(scene.file.structure, name)
-        if math.isfinite(given):
-            refuse(scene, f"structure.{name}", given, "'rigid': the printed frequencies are of a rigid clamp")
+        stiffness = getattr(scene.file.structure, name)
+        if math.isfinite(stiffness):
+            refuse(scene, f"structure.{name}", stiffness, "'rigid': the printed frequencies are of a rigid clamp")
 
 
 def _check_stops(scene: Scene, mechanics: Mechanics) -> None:
-    """Stops that move, and those that do not move with the base, are those of contacts there are."""
+    """Check that loads on stops name existing contacts."""
     names = [contact.name for contact in mechanics.contacts]
     for i, load in enumerate(scene.file.loads):
-        moved = [("contact", load.contact)] if isinstance(load, StopMotionSpec) else []
-        moved += [("fixed_stops", name) for name in load.fixed_stops] if isinstance(load, BaseMotionSpec) else []
-        for part, name in moved:
+        names_used = [("contact", load.contact)] if isinstance(load, StopMotionSpec) else []
+        names_used += [("fixed_stops", name) for name in load.fixed_stops] if isinstance(load, BaseMotionSpec) else []
+        for part, name in names_used:
             if name not in names:
                 refuse(scene, f"loads[{i}].{part}", name, one_of(name, names, "contacts"))

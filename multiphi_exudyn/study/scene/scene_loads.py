@@ -1,7 +1,7 @@
-"""The loads of a scene file as loads of multiphi_exudyn.mechanics.loads, and in words.
+"""The loads of a scene file as loads of multiphi_exudyn.mechanics.loads, and as phrases.
 
 Weight and base motion act along a unit rigid-body motion of the structure; a beam's is its transverse one, which
-depends on its mesh and is given here by who has the mesh.
+depends on its mesh and is an argument here.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ __all__ = ["load_phrases", "loads_of"]
 
 FORCES: dict[str, Callable[..., Load]] = {"constant": ConstantLoad, "harmonic": HarmonicLoad, "sweep": SweepLoad}
 COURSES: dict[str, Callable[..., TimeFunction]] = {"harmonic": Harmonic, "sweep": Sweep}
-Given = TypeVar("Given", bound=At)  # direction of a scene file
+Direction = TypeVar("Direction", bound=At)  # direction of a scene file
 
 
 def loads_of(scene: Scene, transverse: np.ndarray | None) -> tuple[Load, ...]:
-    """The loads, in the file's order; raises MultiPhiValueError naming file and field.
+    """Build the loads in the order of the file; raises MultiPhiValueError with file and field.
 
     transverse: unit rigid-body motion along +z, None for a structure that has none.
     """
@@ -48,7 +48,7 @@ def loads_of(scene: Scene, transverse: np.ndarray | None) -> tuple[Load, ...]:
 
 
 def load_phrases(loads: Sequence[LoadSpec]) -> tuple[str, ...]:
-    """Every load in words, as parts of a sentence."""
+    """A phrase for each load."""
     return tuple(map(_phrase, loads))
 
 
@@ -66,8 +66,8 @@ def _load(scene: Scene, field: str, spec: LoadSpec, transverse: np.ndarray | Non
     return FORCES[spec.kind](**spec.model_dump(exclude={"kind"}))
 
 
-def _along(scene: Scene, field: str, given: Given | None, transverse: np.ndarray | None) -> Given | np.ndarray:
-    direction = transverse if given is None else given
+def _along(scene: Scene, field: str, own: Direction | None, transverse: np.ndarray | None) -> Direction | np.ndarray:
+    direction = transverse if own is None else own
     if direction is None:
         refuse(scene, f"{field}.direction", None, "a direction: only a structure of beams has one of its own")
     return direction
@@ -89,8 +89,8 @@ def _phrase(spec: LoadSpec) -> str:
     if isinstance(spec, GravitySpec):
         return f"a weight of {spec.acceleration:+g} m/s²"
     if isinstance(spec, BaseMotionSpec):
-        left = f", which {' and '.join(spec.fixed_stops)} does not follow" if spec.fixed_stops else ""
-        return f"a base that moves by {_course_phrase(spec.course, 'm')}{left}"
+        exceptions = f", which {' and '.join(spec.fixed_stops)} does not follow" if spec.fixed_stops else ""
+        return f"a base that moves by {_course_phrase(spec.course, 'm')}{exceptions}"
     if isinstance(spec, StopMotionSpec):
         return f"a stop of {spec.contact} that moves by {_course_phrase(spec.course, 'm')}"
     if isinstance(spec, ConstantLoadSpec):
