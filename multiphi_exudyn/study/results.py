@@ -1,4 +1,4 @@
-"""The results of a study as a pandas table; pandas is only loaded where a table is asked for."""
+"""Load the results of a study as a pandas table; pandas is imported at the first call."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["TABLE", "load"]
 
 TABLE = "runs.csv"  # in a study's folder
-CHOSEN = ("at.", "setting.", "nearby.")  # columns of what was varied, numbers beside words like "rigid"
+VARIED = ("at.", "setting.", "nearby.")  # columns of varied fields, with numbers and words like "rigid"
 
 
 def load(folder: str | Path) -> pd.DataFrame:
@@ -55,16 +55,16 @@ def load(folder: str | Path) -> pd.DataFrame:
     path = Path(folder) / TABLE
     if not path.is_file():
         raise MultiPhiValueError(f"folder: got {str(folder)!r}, need the folder of a finished study, with {TABLE}")
-    found = pd.read_csv(path)
-    for name in found.columns[found.dtypes.map(pd.api.types.is_string_dtype)]:
-        lists = found[name].astype(str).str.startswith("[").any()
-        if lists or name.startswith(CHOSEN):
-            found[name] = pd.Series([_value(cell) for cell in found[name]], index=found.index, dtype=object)
-    return found
+    table = pd.read_csv(path)
+    for name in table.columns[table.dtypes.map(pd.api.types.is_string_dtype)]:
+        lists = table[name].astype(str).str.startswith("[").any()
+        if lists or name.startswith(VARIED):
+            table[name] = pd.Series([_value(cell) for cell in table[name]], index=table.index, dtype=object)
+    return table
 
 
 def _value(cell: Any) -> Any:
-    """What a text stands for: a number, a list, or itself."""
+    """Value of a cell: a number, a list, or the text itself."""
     try:
         return json.loads(cell)
     except (TypeError, ValueError):

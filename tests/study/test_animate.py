@@ -14,7 +14,7 @@ from multiphi_exudyn.study.comparison.animation import (
     LONGEST,
     MOST_FRAMES,
     PERIOD_SHOWN,
-    Stage,
+    AnimatedScene,
     _closed,
     gif,
     moving_figure,
@@ -57,44 +57,44 @@ def refused(capsys, *arguments):
 
 
 def drawn(path, frame, **chosen):
-    """The stage, both runs, and the axes of one frame."""
-    stage = stage_of(load_scene(path), **chosen)
-    runs = stage.runs(progress=False)
-    figure, move = moving_figure(stage, runs)
+    """The animated scene, both runs, and the axes of one frame."""
+    animated = stage_of(load_scene(path), **chosen)
+    runs = animated.runs(progress=False)
+    figure, move = moving_figure(animated, runs)
     move(frame)
-    return stage, runs, figure.axes
+    return animated, runs, figure.axes
 
 
 def test_points_at_every_node_leave_both_models_as_they_are(scene):
-    stage, runs, (axes, _) = drawn(scene, 7, slow=20.0)
+    animated, runs, (axes, _) = drawn(scene, 7, slow=20.0)
     loaded = load_scene(scene)
     bench = prepare(loaded, mechanics_of(loaded))
     for name, run in runs.items():
         alone = run_model(bench, name, progress=False)
         assert np.max(np.abs(run.points["tip"] - alone.points["tip"])) < SAME
         line = next(each for each in axes.lines if each.get_label() == name)
-        now = np.interp(stage.time[7], alone.time, alone.points["tip"])
+        now = np.interp(animated.time[7], alone.time, alone.points["tip"])
         assert line.get_ydata()[-1] == pytest.approx(1e3 * now, abs=1e3 * SAME)
         assert line.get_xdata()[[0, -1]] == pytest.approx([0.0, 0.5])
         assert abs(line.get_ydata()[0]) < 1e-12
 
 
 def test_the_shape_between_the_points_is_the_trajectory_of_the_linear_elements(tmp_path):
-    stage, _, (axes, _) = drawn(write(tmp_path / "linear.toml", PLAIN), 4, slow=5.0)
+    animated, _, (axes, _) = drawn(write(tmp_path / "linear.toml", PLAIN), 4, slow=5.0)
     loaded = load_scene(str(tmp_path / "linear.toml"))
     bench = prepare(loaded, mechanics_of(loaded))
     model = mp.MultiPhiModel(bench.structure, bench.mechanics.contacts)
     start = model.static_equilibrium({"tip": 1.0})
     trajectory = mp.simulate(model, 0.1, displacement=start * 0.01 / (bench.structure.row("tip") @ start))
-    expected = trajectory.displacement(stage.time[4])[::2]
+    expected = trajectory.displacement(animated.time[4])[::2]
     assert axes.lines[0].get_ydata()[1:] == pytest.approx(1e3 * expected, abs=1e-4)
 
 
 def test_a_stop_stands_where_the_gap_is_closed_and_has_the_colour_of_closed_only_then(scene):
-    stage, runs, _ = drawn(scene, 0, slow=20.0)
+    animated, runs, _ = drawn(scene, 0, slow=20.0)
     run = runs["full"]
-    figure, move = moving_figure(stage, runs)
-    closed = _closed(run.contact_intervals["stop"], stage.time)
+    figure, move = moving_figure(animated, runs)
+    closed = _closed(run.contact_intervals["stop"], animated.time)
     assert 0 < np.sum(closed) < len(closed)
     for frame in (0, int(np.argmax(closed))):
         move(frame)
@@ -108,16 +108,16 @@ def test_a_stop_above_and_one_that_moves(tmp_path):
     course = {"kind": "harmonic", "amplitude": 2e-4, "frequency_hz": 30.0}
     loads = [{"kind": "stop-motion", "contact": "stop", "course": course}]
     data = changed(["contacts", 0, "direction"], {"middle": -1.0}, PLAIN) | {"loads": loads}
-    stage, _, (axes, _) = drawn(write(tmp_path / "above.toml", data), 5, model="r6", reference="r6", slow=5.0)
+    animated, _, (axes, _) = drawn(write(tmp_path / "above.toml", data), 5, model="r6", reference="r6", slow=5.0)
     mark = axes.lines[1]
     assert mark.get_marker() == "v"
-    assert mark.get_ydata()[0] == pytest.approx(1 - 0.2 * np.cos(2 * np.pi * 30.0 * stage.time[5]), abs=1e-3)
+    assert mark.get_ydata()[0] == pytest.approx(1 - 0.2 * np.cos(2 * np.pi * 30.0 * animated.time[5]), abs=1e-3)
 
 
 def test_beams_that_meet_are_each_shown_with_the_other_where_it_would_touch(tmp_path):
-    stage, runs, axes = drawn(write(tmp_path / "pair.toml", PLAIN | PAIR), 20, slow=32.0)
+    animated, runs, axes = drawn(write(tmp_path / "pair.toml", PLAIN | PAIR), 20, slow=32.0)
     run = runs["r"]
-    now = stage.time[20]
+    now = animated.time[20]
     at = {name: 1e3 * np.interp(now, run.time, run.points[name]) for name in ("a.tip", "b.middle")}
     assert len(axes) == 4  # three beams, a history
     of_a, of_b = axes[0].lines[1], axes[1].lines[1]
@@ -128,11 +128,11 @@ def test_beams_that_meet_are_each_shown_with_the_other_where_it_would_touch(tmp_
 
 
 def test_the_gif_has_every_frame_and_its_rate(scene):
-    stage = stage_of(load_scene(scene), slow=4.0)
+    animated = stage_of(load_scene(scene), slow=4.0)
     drawn_frames = []
-    content = gif(stage, stage.runs(progress=False), lambda: drawn_frames.append(1))
+    content = gif(animated, animated.runs(progress=False), lambda: drawn_frames.append(1))
     with Image.open(io.BytesIO(content)) as written:
-        assert written.n_frames == len(stage.time) == len(drawn_frames) == 10
+        assert written.n_frames == len(animated.time) == len(drawn_frames) == 10
         assert written.info["duration"] == 40
         assert written.info["loop"] == 0
 
@@ -153,15 +153,15 @@ def test_without_a_factor_a_period_is_shown_at_length_in_a_film_that_ends(scene)
 
 def test_a_model_that_fails_is_exit_code_1_with_its_cause_and_no_file(scene, tmp_path, capsys, monkeypatch):
     data = changed(["models", 2, "newton_tolerance"], 1e-30, WITH_FULL)
-    monkeypatch.setattr(Stage, "runs", lambda stage, progress: _failing(stage))
+    monkeypatch.setattr(AnimatedScene, "runs", lambda animated, progress: _failing(animated))
     assert cli.main(["animate", write(tmp_path / "failing.toml", data)]) == 1
     assert capsys.readouterr().out.startswith("full: failed, ")
     assert list((tmp_path / "multiphi-failing").iterdir()) == []
 
 
-def _failing(stage):
+def _failing(animated):
     """Both runs, the full one not tried again at gentler settings."""
-    return {name: run_model(stage.bench, name, progress=False) for name in stage.models}
+    return {name: run_model(animated.bench, name, progress=False) for name in animated.models}
 
 
 @pytest.mark.parametrize(

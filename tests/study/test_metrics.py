@@ -46,7 +46,7 @@ def test_the_largest_difference_is_that_of_its_window():
 def test_running_nrmse_is_the_nrmse_of_every_window_in_which_the_reference_moves(pair):
     values, reference = pair
     time = np.arange(20.0)
-    moves = np.sqrt(np.cumsum(reference**2)) > 1.001 * metrics.STILL * np.linalg.norm(reference)
+    moves = np.sqrt(np.cumsum(reference**2)) > 1.001 * metrics.SMALLEST_NORM * np.linalg.norm(reference)
     expected = np.array([metrics.nrmse(values, reference, time, until) for until in time])
     found = metrics.running_nrmse(values, reference)
     np.testing.assert_allclose(found[moves], expected[moves], rtol=1e-9)
@@ -62,11 +62,11 @@ def test_a_point_still_at_rest_does_not_end_agreement():
 
 def test_levels_held_are_those_between_the_ends_of_intervals():
     intervals = {"a": np.array([[0.0, 0.2], [0.5, 0.7]]), "b": np.array([[0.1, 0.6]]), "c": np.empty((0, 2))}
-    held = metrics.held_levels(intervals, 1.0)
+    held = metrics.level_durations(intervals, 1.0)
     assert held == pytest.approx({("a",): 0.2, ("a", "b"): 0.2, ("b",): 0.3, (): 0.3})
     assert metrics.union(intervals.values()) == pytest.approx(np.array([[0.0, 0.7]]))
     assert metrics.union([intervals["c"]]).shape == (0, 2)
-    assert metrics.held_levels({}, 2.0) == {(): 2.0}
+    assert metrics.level_durations({}, 2.0) == {(): 2.0}
 
 
 @given(PAIR, st.sampled_from([1e-3, 1e3]))

@@ -34,7 +34,7 @@ VARIANTS = ("hole", "minus-z", "as-published", "printed-pinned")  # of the rig: 
 @pytest.fixture
 def in_this_process(monkeypatch):
     """The run takes its levels and memory wherever it is made; only what it imports asks for a process of its own."""
-    monkeypatch.setattr(needs_module, "_in_a_process", lambda task: json.dumps(run_alone(*pickle.loads(task))))
+    monkeypatch.setattr(needs_module, "_run_in_process", lambda task: json.dumps(run_alone(*pickle.loads(task))))
 
 
 @pytest.mark.usefixtures("in_this_process")

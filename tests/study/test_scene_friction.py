@@ -12,7 +12,7 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.cli.main import main
 from multiphi_exudyn.study.accuracy.cases import load_study
 from multiphi_exudyn.study.comparison.compare import compare, histories, summary
-from multiphi_exudyn.study.comparison.plots import greyed, history_figure
+from multiphi_exudyn.study.comparison.plots import grey_spans, history_figure
 from multiphi_exudyn.study.comparison.report import render
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
@@ -77,7 +77,7 @@ def test_grey_is_where_it_sticks_if_there_are_no_contacts(compared):
     figure = history_figure(compared, "tip")
     assert figure.axes[0].get_title("left") == "Displacement of tip; grey: friction sticks in the reference"
     assert len(figure.axes) == 2
-    spans, _ = greyed(compared.reference)
+    spans, _ = grey_spans(compared.reference)
     assert len(spans) == len(figure.axes[0].patches) > 1
     assert spans == pytest.approx(compared.reference.stick_intervals["ring"])
     assert "the first contact phase, and" not in render(compared, [], {})

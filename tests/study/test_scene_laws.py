@@ -101,7 +101,7 @@ class TestForms:
 
     def test_every_kind_is_told_in_words(self, tmp_path):
         bench = bench_of(tmp_path, with_laws(*(LAWS[k] | {"name": k} for k in LAWS)))
-        assert tuple(law.in_words() for law in bench.scene.file.force_laws) == (
+        assert tuple(law.phrase() for law in bench.scene.file.force_laws) == (
             "the force law table at tip (a table of 3 places)",
             "the force law cubic at tip (50 N/m q +2e+06 N/m³ q³)",
             "the force law hertz at tip (20000 N/m^1.5 beyond a gap of 1 mm)",

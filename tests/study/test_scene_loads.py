@@ -13,7 +13,7 @@ from multiphi_exudyn.study.comparison.mode_shapes import level_modes
 from multiphi_exudyn.study.comparison.report import render
 from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scene_loads import described_loads
+from multiphi_exudyn.study.scene.scene_loads import load_phrases
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare, start_configuration
 
@@ -185,7 +185,7 @@ class TestReport:
 
     def test_the_loads_are_told_where_the_start_is(self, comparison):
         told = " ".join(findings(comparison)["compared"])
-        assert "It starts straight and at rest. From t = 0 on it is driven by a force at tip of 2 N, " in told
+        assert "It starts undeformed and at rest. From t = 0 on it is driven by a force at tip of 2 N, " in told
         assert "harmonic at 12 Hz and a weight of -9.81 m/s²" in told
         assert "released" not in told
 
@@ -212,7 +212,7 @@ class TestReport:
 
 def test_every_kind_is_told_in_words(tmp_path):
     scene, _ = loaded(tmp_path, at_rest(*LOADS.values()))
-    assert described_loads(scene.file.loads) == (
+    assert load_phrases(scene.file.loads) == (
         "a constant force of -2 N at +1 tip and -0.5 middle",
         "a force at tip of 2 N, harmonic at 12 Hz",
         "a force at tip of 3 samples",

@@ -22,7 +22,7 @@ from multiphi_exudyn.study.accuracy.study_figures import (
     response_figure,
     styles,
 )
-from multiphi_exudyn.study.accuracy.study_findings import error_words, findings, shown_points
+from multiphi_exudyn.study.accuracy.study_findings import error_text, findings, shown_points
 from multiphi_exudyn.study.accuracy.study_report import render_study
 from multiphi_exudyn.study.comparison.wording import percent
 
@@ -68,7 +68,7 @@ def texts_of(figure):
 def test_the_first_lines_say_what_was_asked_what_came_out_and_what_to_distrust(result):
     found = findings(result)
     (compared,) = found["compared"]
-    assert "How large are error and run time of 4 methods, at 35 settings in all" in compared
+    assert "What are the error and the run time of 4 methods, at 35 settings in all" in compared
     assert "NRMSE to 0.3 s, the worst of node2, node3 and of each setting's nearby runs" in compared
     assert "the reference (reference, in words)" in compared
     assert found["outcome"] == (
@@ -83,8 +83,11 @@ def test_the_first_lines_say_what_was_asked_what_came_out_and_what_to_distrust(r
         "The most accurate is Multi-Phi (r = 16): 0.12 %.",
     )
     doubts = " ".join(found["distrust"])
-    assert "coarser copy of itself by 0.10 %. Smaller errors say nothing. The two agree to 1 % until 0.25 s" in doubts
-    assert "2 of 85 runs failed or took too long. Settings whose error is not known: 1 of 35." in doubts
+    assert (
+        "coarser copy of itself by 0.10 %. Smaller errors are not significant. The two agree to 1 % until 0.25 s"
+        in doubts
+    )
+    assert "2 of 85 runs failed or took too long. Settings without an error: 1 of 35." in doubts
     assert "short form" not in doubts
 
 
@@ -104,19 +107,19 @@ def test_a_busy_machine_and_unsteady_repeats_are_told():
     results = [result_of([row("a", 0.1)], [first, each]) for each in late]
     doubts = [" ".join(findings(each)["distrust"]) for each in results]
     assert findings(results[1])["timing"][-1].endswith("Load average of the machine meanwhile: 3.2 to 3.2.")
-    assert "not alone" not in doubts[0]
+    assert "Other programs" not in doubts[0]
     assert "differ most" not in doubts[0]
-    assert "not alone on the machine: the load average rose to 3.2" in doubts[1]
+    assert "Other programs ran during the timing pass: the load average rose to 3.2" in doubts[1]
     assert "The repeats of a differ most: 4 to 1." in doubts[1]
 
 
 def test_what_lies_below_the_uncertainty_is_told_as_that():
     given = result_of([row("reference"), row("coarser", 0.03), row("a", 0.02)], [timing("a", 1.0)])
-    assert "Which settings are within 2 %, 1 % is not decided here." in " ".join(findings(given)["distrust"])
+    assert "Which settings are within 2 %, 1 % cannot be decided here." in " ".join(findings(given)["distrust"])
     assert findings(given)["outcome"][-1] == "The most accurate is a: ≤ 3.00 % (uncertainty)."
-    assert error_words(0.04, 0.03) == "4.00 %"
-    assert error_words(None, 0.03) == "–"
-    assert error_words(0.02, None) == "2.00 %"
+    assert error_text(0.04, 0.03) == "4.00 %"
+    assert error_text(None, 0.03) == "–"
+    assert error_text(0.02, None) == "2.00 %"
 
 
 def test_without_a_full_model_that_holds_the_tolerance_nothing_is_called_faster():
@@ -148,10 +151,10 @@ def test_every_section_with_data_appears_in_its_place(page):
         "Time-frequency maps",
         "Contact, every method at its most accurate setting",
         "Failed runs",
-        "How it was measured",
+        "How errors and times were computed",
         "Assumptions",
-        "How the numbers are defined",
-        "Where this ran",
+        "Definitions",
+        "Machine and versions",
     ]
 
 
@@ -167,7 +170,7 @@ def test_rigid_levels_stand_beside_a_stiff_stop():
 
 def test_sections_without_data_do_not_appear():
     bare = render_study(result_of([row("reference"), row("a", 0.1)], assumptions=()))
-    assert headings(bare) == ["How it was measured", "How the numbers are defined", "Where this ran"]
+    assert headings(bare) == ["How errors and times were computed", "Definitions", "Machine and versions"]
     assert "timing pass runs" not in text_of(bare)
 
 
@@ -369,8 +372,10 @@ def test_budgets_without_methods_have_a_table(monkeypatch):
         replace(rows[1], values={"windows": {"0.1": {"rigid": {"all": None}}}}),
     ]
     told = findings(result_of([], budgets=tuple(rows), methods=[]))
-    assert told["compared"][0].startswith("Where does the difference between the full and the reduced model come from?")
-    assert told["outcome"] == ("Of 3 error budgets 1 are explained by their parts; the table below has them.",)
+    assert told["compared"][0].startswith("What causes the difference between the full and the reduced model?")
+    assert told["outcome"] == (
+        "In 1 of 3 error budgets the parts add up to the whole difference; the table below shows all.",
+    )
     text = text_of(render_study(result_of([], budgets=tuple(rows[:1]), methods=[])))
     parts = "contact law 80 %, modal truncation 20 %, time integration -0 %"
     assert f"start.displacement = 0.02 rigid 0.3 s 12.0 % {parts} yes" in text

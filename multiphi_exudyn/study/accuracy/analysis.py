@@ -1,6 +1,6 @@
-"""What a study's result says: fronts, the cheapest setting, how much faster it is, the reference's own uncertainty.
+"""Evaluate the result of a study: Pareto fronts, cheapest settings, speedups, uncertainty of the reference.
 
-Nothing is run and nothing drawn here. Times in s. Tables have the columns of ``StudyResult.table``.
+Times in s. Tables have the columns of ``StudyResult.table``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import pandas as pd
 from multiphi_exudyn.study.accuracy.study_file import COARSER, REFERENCE, is_number
 from multiphi_exudyn.study.accuracy.study_result import StudyResult, worst_judged
 from multiphi_exudyn.study.comparison.wording import seconds
-from multiphi_exudyn.study.running.runner import modes_words
+from multiphi_exudyn.study.running.runner import modes_text
 from multiphi_exudyn.study.sweep.row import key_of
 
 __all__ = [
@@ -52,12 +52,12 @@ def settings_at(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
 
 
 def references_at(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
-    """The reference and its coarser copy there."""
+    """The reference and its coarser copy at one point of the scene's axes."""
     return _at(result.table[result.table.method.isin([REFERENCE, COARSER])], at)
 
 
 def full_methods(result: StudyResult) -> list[str]:
-    """Names of those that are full models."""
+    """Names of the methods that are full models."""
     return [method.name for method in result.study.methods if method.model.get("kind") == "full"]
 
 
@@ -67,20 +67,20 @@ def points(result: StudyResult) -> list[Mapping[str, Any]]:
 
 
 def front(table: pd.DataFrame) -> pd.DataFrame:
-    """Those that no other one beats in time and error both, fastest first; of equal ones the first."""
-    known = table.dropna(subset=["online_s", "error"]).sort_values(["online_s", "error"], kind="stable")
-    return known[known.error < known.error.cummin().shift(fill_value=math.inf)]
+    """Pareto front of time and error, fastest first; of equal settings the first."""
+    complete = table.dropna(subset=["online_s", "error"]).sort_values(["online_s", "error"], kind="stable")
+    return complete[complete.error < complete.error.cummin().shift(fill_value=math.inf)]
 
 
 def cheapest(result: StudyResult, at: Mapping[str, Any], tolerance: float, lasting: bool = False) -> pd.DataFrame:
-    """Every method's fastest setting whose error holds the tolerance at one point, the fastest method first.
+    """Fastest setting of each method whose error is within the tolerance at one point, the fastest method first.
 
-    A line for each method, empty where none of its settings holds it. faster: online time of the fastest full model
-    that does over its own. lasting: whether the lasting error has to hold it.
+    A row for each method, empty if none of its settings is. faster: online time of the fastest full model within the
+    tolerance over that of the setting. lasting: whether the lasting error has to be within the tolerance.
     """
     drawn = settings_at(result, at)
-    holds = drawn[(drawn.lasting_error if lasting else drawn.error) <= tolerance].dropna(subset="online_s")
-    best = holds.sort_values(["online_s", "error"], kind="stable").groupby("method", sort=False).head(1)
+    within = drawn[(drawn.lasting_error if lasting else drawn.error) <= tolerance].dropna(subset="online_s")
+    best = within.sort_values(["online_s", "error"], kind="stable").groupby("method", sort=False).head(1)
     others = pd.DataFrame({"method": [name for name in drawn.method.unique() if name not in set(best.method)]})
     full = best.online_s[best.method.isin(full_methods(result))].min()
     return pd.concat([best.assign(faster=full / best.online_s), others], ignore_index=True)
@@ -88,22 +88,22 @@ def cheapest(result: StudyResult, at: Mapping[str, Any], tolerance: float, lasti
 
 def most_accurate(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
     """Every method's most accurate setting at one point of the scene's axes."""
-    known = settings_at(result, at).dropna(subset="error")
-    return known.loc[known.groupby("method", sort=False).error.idxmin()]
+    table = settings_at(result, at).dropna(subset="error")
+    return table.loc[table.groupby("method", sort=False).error.idxmin()]
 
 
 def over_all_points(result: StudyResult) -> pd.DataFrame:
-    """Of each setting, method by method: points with an error, its median and largest, and the median time [s]."""
+    """Over all points, for each setting: number of points with an error, its median and maximum, median time [s]."""
     table = settings(result)
-    named = table.assign(setting=[words(setting) or "–" for setting in table.setting])
-    of_setting = named.astype({"online_s": float}).groupby(["method", "setting"], sort=False)
+    labelled = table.assign(setting=[words(setting) or "–" for setting in table.setting])
+    of_setting = labelled.astype({"online_s": float}).groupby(["method", "setting"], sort=False)
     return of_setting.agg(
         points=("error", "count"), median=("error", "median"), worst=("error", "max"), online_s=("online_s", "median")
     ).reset_index()
 
 
 def stiff_errors(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
-    """Of the settings with rigid levels at one point that ran: their errors against stiff stops as well.
+    """Settings with rigid levels at one point of the axes, with their errors against stiff stops.
 
     stiff_error: the largest NRMSE of the judged points; stiff_uncertainty: the stiff stops' own.
     """
@@ -113,49 +113,49 @@ def stiff_errors(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
         pd.Series([worst_judged(result, each.get(name, {})) for each in kept], drawn.index, float)
         for name in ("errors", "uncertainty")
     )
-    found = drawn.assign(stiff_error=errors, stiff_uncertainty=own)
-    return found.dropna(subset=["stiff_error", "stiff_uncertainty"])
+    table = drawn.assign(stiff_error=errors, stiff_uncertainty=own)
+    return table.dropna(subset=["stiff_error", "stiff_uncertainty"])
 
 
 def indicators(result: StudyResult) -> pd.DataFrame:
-    """method, indicator, error (NaN without) of every run that has an indicator, nearby ones included."""
+    """Columns method, indicator, error (NaN for none) of all runs with an indicator, nearby ones included."""
     runs = result.runs[~result.runs.method.isin([REFERENCE, COARSER])]
-    given = runs.measures.map(lambda each: each.get("indicator")).astype(float)
-    return runs.assign(indicator=given)[["method", "indicator", "error"]].dropna(subset="indicator")
+    indicator = runs.measures.map(lambda each: each.get("indicator")).astype(float)
+    return runs.assign(indicator=indicator)[["method", "indicator", "error"]].dropna(subset="indicator")
 
 
 def rank_correlation(pairs: pd.DataFrame) -> tuple[float | None, int]:
-    """Spearman's rank correlation of indicator and error, None without meaning, and of how many runs it is."""
-    known = pairs[pairs.error >= ROUND_OFF]
-    if len(known) < FEWEST or known.indicator.nunique() < 2 or known.error.nunique() < 2:
-        return None, len(known)
-    return float(known.indicator.corr(known.error, method="spearman")), len(known)
+    """Spearman's rank correlation of indicator and error (None for too few values), and its number of runs."""
+    runs = pairs[pairs.error >= ROUND_OFF]
+    if len(runs) < FEWEST or runs.indicator.nunique() < 2 or runs.error.nunique() < 2:
+        return None, len(runs)
+    return float(runs.indicator.corr(runs.error, method="spearman")), len(runs)
 
 
 def uncertainty(result: StudyResult, at: Mapping[str, Any]) -> float | None:
-    """Error of the reference's coarser copy: smaller differences to the reference say nothing."""
-    known = _coarser(result, at).own_error.dropna()
-    return None if known.empty else float(known.iloc[0])
+    """Error of the reference's coarser copy: smaller differences to the reference are not significant."""
+    errors = _coarser(result, at).own_error.dropna()
+    return None if errors.empty else float(errors.iloc[0])
 
 
 def pointwise_until(result: StudyResult, at: Mapping[str, Any], tolerance: float) -> float | None:
-    """From when on [s] pointwise comparison has lost its meaning: the coarser copy's agreement horizon."""
+    """Agreement horizon [s] of the coarser copy: pointwise comparison is not meaningful after it."""
     horizons = (each.get("horizon", {}).get(f"{tolerance:g}") for each in _coarser(result, at).measures)
     return next(horizons, None)
 
 
 def longest(result: StudyResult) -> float:
-    """The longest window [s] that errors are known for: the whole run."""
+    """Longest window [s] with errors: the whole run."""
     return max((float(w) for row in result.rows for w in row.values.get("nrmse", {})), default=0.0)
 
 
 def words(fields: Mapping[str, Any]) -> str:
-    """Fields of a setting or of a point as an engineer would say them: "r = 8, step 70 µs"."""
+    """Fields of a setting or of a point as text: "r = 8, step 70 µs"."""
     return ", ".join(_word(field, value) for field, value in fields.items())
 
 
 def named(method: str, setting: Mapping[str, Any]) -> str:
-    """A setting in words: "multiphi (r = 8)"."""
+    """A method with its setting as text: "multiphi (r = 8)"."""
     return f"{method} ({words(setting)})" if setting else method
 
 
@@ -164,13 +164,13 @@ def _at(table: pd.DataFrame, at: Mapping[str, Any]) -> pd.DataFrame:
 
 
 def _coarser(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
-    there = references_at(result, at)
-    return there[there.method == COARSER]
+    table = references_at(result, at)
+    return table[table.method == COARSER]
 
 
 def _word(field: str, value: Any) -> str:
     if field == "modes":
-        return modes_words(value)
+        return modes_text(value)
     if field == "elements":
         return f"{value} elements"
     if field == "step":

@@ -88,7 +88,7 @@ class Budget:
             "start": _start(self.bench).model_dump(),
             "modes": self.modes,
             "dofs": self.bench.structure.n,
-            "rungs": {rung.name: _described(rung) for rungs in self.ladders.values() for rung in rungs},
+            "rungs": {rung.name: _rung_values(rung) for rungs in self.ladders.values() for rung in rungs},
             "windows": {
                 f"{until:g}": {
                     ladder: {group: decomposition(rungs, points, until) for group, points in groups.items()}
@@ -201,7 +201,7 @@ def _sum(values: Sequence[float | None]) -> float | None:
 
 
 def _check(bench: Workbench, modes: int, step: float | None) -> None:
-    most = bench.structure.n - bench.mechanics.directions
+    most = bench.structure.n - bench.mechanics.direction_count
     if isinstance(modes, bool) or not isinstance(modes, int):
         raise MultiPhiTypeError(f"modes: got {modes!r}, need an integer")
     if not 1 <= modes <= most:
@@ -292,7 +292,7 @@ def _settled(bench: Workbench, runs: Sequence[ModelRun], linear: ModelRun) -> bo
     return _norm(last - before) <= SETTLED * _norm(last - other)
 
 
-def _described(rung: Rung) -> dict[str, Any]:
+def _rung_values(rung: Rung) -> dict[str, Any]:
     run = rung.run
     failed = [f"{cause}: {o.message}" for cause, runs in rung.uncertainty_runs.items() for o in runs if not o.ok]
     known = {"label": rung.label, "status": run.status, "message": run.message, "dofs": run.dofs, "steps": run.steps}

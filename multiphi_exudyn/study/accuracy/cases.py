@@ -1,11 +1,11 @@
-"""Cases of a study: every run that its file asks for, as one dict of parameters, and the scene each is run in.
+"""Cases of a study: the parameters of each of its runs, and the scene of each run.
 
     {"scene": name, "content": hash, "at": {field: value}, "method": name, "setting": {field: value},
      "nearby": {field: factor}}
 
-content stands for the scene file with the study's changes, the reference, the method's model, the matrices a scene
-names, the time limit, and the versions of this package and of Exudyn: a run is found again only where all that could
-alter it is the same. The method "reference" is the scene's reference at that point of the axes, "coarser" its copy.
+content is a hash of the scene with the study's changes, the reference, the method's model, the files of matrices, the
+time limit, and the versions of this package and of Exudyn: a stored run is reused only if all of these are the same.
+The method "reference" is the scene's reference at that point of the axes, "coarser" its copy.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ __all__ = ["BUDGET", "CASE", "Parameters", "Study", "load_study", "shipped_studi
 CASE = "case"  # name of the model that a case runs
 BUDGET = "budget"  # method of the error budgets' cases
 DEFAULT_MODES = SceneFile.model_fields["modes"].default
-MOST_RUNS = 1_000_000  # of a study: beyond that a typing error is likelier than a wish
+MOST_RUNS = 1_000_000  # of a study: more is probably a typing error
 
 Parameters = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Study:
-    """A validated study: name, path and content of its file; path and raw content of its scene, changes made.
+    """A validated study: name, path and content of its file; path and raw content of its scene with the changes.
 
     quick: whether it is the short form.
     """
@@ -59,10 +59,10 @@ class Study:
 
     @functools.cached_property
     def _matrices(self) -> list[str]:
-        """What stands in the files of matrices and rows that the scene names; empty without such files."""
+        """Hashes of the scene's files of matrices and rows; empty without such files."""
         structure = self.scene.get("structure", {})
-        given = structure.get("matrices", "")
-        names = [given] if isinstance(given, str) else [*given.values(), *structure.get("points", {}).values()]
+        matrices = structure.get("matrices", "")
+        names = [matrices] if isinstance(matrices, str) else [*matrices.values(), *structure.get("points", {}).values()]
         files = [self.scene_path.parent / name for name in names if isinstance(name, str)]
         return [hashlib.sha256(file.read_bytes()).hexdigest() for file in files if file.is_file()]
 
@@ -87,17 +87,17 @@ class Study:
 
     def budgets(self) -> list[Parameters]:
         """One case for each point of the axes, if the study has a budget."""
-        wanted = self.file.budget
-        return [] if wanted is None else [self._case(at, BUDGET, wanted.model_dump(), {}) for at in self.points]
+        budget = self.file.budget
+        return [] if budget is None else [self._case(at, BUDGET, budget.model_dump(), {}) for at in self.points]
 
     def scene_for(self, parameters: Mapping[str, Any]) -> Scene:
-        """The scene of a case: its models that play a part, and the case's own model under the name CASE."""
+        """Scene of a case: the models named in its comparison, and the model of the case under the name CASE."""
         data = copy.deepcopy(dict(self.scene))
         for field, value in parameters["at"].items():
             _put(data, field, value)
         parts = data["comparison"]
-        named = {parts["reference"], parts.get("coarser"), *parts.get("cheapest", ())}
-        models = [m for m in data["models"] if parameters["method"] == BUDGET or _name(m, data) in named]
+        names = {parts["reference"], parts.get("coarser"), *parts.get("cheapest", ())}
+        models = [m for m in data["models"] if parameters["method"] == BUDGET or _name(m, data) in names]
         if parameters["method"] not in (REFERENCE, COARSER, BUDGET):
             models.append(self._model(parameters) | {"name": CASE})
         return scene_of(self.scene_path, data | {"models": models})
@@ -118,7 +118,7 @@ class Study:
     def _case(
         self, at: Mapping[str, Any], method: str, setting: Mapping[str, Any], nearby: Mapping[str, float]
     ) -> Parameters:
-        model = next((given.model for given in self.file.methods if given.name == method), {})
+        model = next((spec.model for spec in self.file.methods if spec.name == method), {})
         return {
             "scene": self.file.scene,
             "content": _hash([self.scene, model, self.file.time_limit_s, self._matrices, _versions()]),
@@ -136,9 +136,9 @@ def shipped_studies() -> dict[str, str]:
 
 
 def load_study(source: str, *, quick: bool = False) -> Study:
-    """The study of a shipped name or a TOML file; all its scenes are checked before anything runs.
+    """Load a shipped study or a TOML file, and check all its scenes.
 
-    Raises MultiPhiValueError, one line: file, field, what was given, what is needed.
+    Raises MultiPhiValueError, one line: file, field, given value, needed value.
     """
     path = _find(source)
     raw = read_toml(path)
@@ -150,15 +150,15 @@ def load_study(source: str, *, quick: bool = False) -> Study:
         _change(data, file, quick)
         scene_of(scene_path, data)
     except MultiPhiValueError as error:
-        told = str(error).removeprefix(f"{scene_path}: ")
-        raise MultiPhiValueError(f"{path}: scene {file.scene} as the study changes it: {told}") from error
+        message = str(error).removeprefix(f"{scene_path}: ")
+        raise MultiPhiValueError(f"{path}: scene {file.scene} as the study changes it: {message}") from error
     study = Study(path.stem, path, file, scene_path, data, quick)
     _check(study)
     return study
 
 
 def _change(data: dict[str, Any], file: StudyFile, quick: bool) -> None:
-    """What a study says in place of its scene."""
+    """Make the changes of a study in the content of its scene."""
     for field, value in (file.change | (file.quick.change if quick else {})).items():
         _put(data, field, value)
     _put(data, "outputs.tolerances", list(file.tolerances))
@@ -169,7 +169,7 @@ def _change(data: dict[str, Any], file: StudyFile, quick: bool) -> None:
 
 
 def _check(study: Study) -> None:
-    """Names, sizes, and every scene of the study; all faults at once."""
+    """Check names, sizes and all scenes of a study; one error lists all faults."""
     if faults := [*_faults_of_methods(study), *_faults_of_size(study)] or [*_faults_of_scenes(study)]:
         raise MultiPhiValueError(f"{study.path}: {'; '.join(faults)}")
 
@@ -205,24 +205,24 @@ def _faults_of_size(study: Study) -> Iterator[str]:
 
 
 def _name(model: Mapping[str, Any], scene: Mapping[str, Any]) -> str:
-    """A model's name with its number of modes filled in."""
+    """Name of a model with its number of modes."""
     modes = model.get("modes", scene.get("modes", DEFAULT_MODES))
     return str(model.get("name")).replace("{modes}", str(modes))
 
 
 def _faults_of_scenes(study: Study) -> Iterator[str]:
-    """Of the first point of the axes at which the scene is wrong, and of the first wrong setting of every method.
+    """Faults of the scene at the first wrong point of the axes, and of the first wrong setting of each method.
 
-    Settings are looked at where the axes begin, in the scene itself where these are wrong.
+    Settings are checked at the first point of the axes, or in the unchanged scene if the points are wrong.
     """
-    wrong = list(itertools.islice(_told(study, map(study.reference, study.points)), 1))
-    yield from wrong
-    for _, cases in itertools.groupby(study.runs({} if wrong else study.points[0]), lambda case: case["method"]):
-        yield from itertools.islice(_told(study, cases), 1)
+    faults = list(itertools.islice(_scene_faults(study, map(study.reference, study.points)), 1))
+    yield from faults
+    for _, cases in itertools.groupby(study.runs({} if faults else study.points[0]), lambda case: case["method"]):
+        yield from itertools.islice(_scene_faults(study, cases), 1)
 
 
-def _told(study: Study, cases: Iterable[Parameters]) -> Iterator[str]:
-    """What is wrong with the scenes of cases."""
+def _scene_faults(study: Study, cases: Iterable[Parameters]) -> Iterator[str]:
+    """Faults of the scenes of cases."""
     for case in cases:
         try:
             mechanics_of(study.scene_for(case))
@@ -231,13 +231,13 @@ def _told(study: Study, cases: Iterable[Parameters]) -> Iterator[str]:
 
 
 def _place(case: Mapping[str, Any]) -> str:
-    """Which run of the study, in words."""
-    chosen = {**case["at"], **case["setting"]}
-    return " ".join([case["method"], *(f"{field}={value}" for field, value in chosen.items())])
+    """A case as text."""
+    fields = {**case["at"], **case["setting"]}
+    return " ".join([case["method"], *(f"{field}={value}" for field, value in fields.items())])
 
 
 def _nearby(method: MethodSpec) -> list[dict[str, float]]:
-    """The setting itself, and its neighbours: all their factors move together."""
+    """Factors of the setting itself ({}) and of its neighbours; all fields change together."""
     count = max((len(factors) for factors in method.nearby.values()), default=0)
     return [{}] + [
         {field: factors[i] for field, factors in method.nearby.items() if i < len(factors)} for i in range(count)
@@ -245,9 +245,9 @@ def _nearby(method: MethodSpec) -> list[dict[str, float]]:
 
 
 def _put_reference(data: dict[str, Any], file: StudyFile) -> None:
-    """The study's own reference, and its copy if it has one, in place of the scene's models."""
-    given = {REFERENCE: file.reference, COARSER: file.coarser}
-    models = {name: model for name, model in given.items() if model is not None}
+    """Replace the models of the scene by the study's reference and its coarser copy."""
+    specs = {REFERENCE: file.reference, COARSER: file.coarser}
+    models = {name: model for name, model in specs.items() if model is not None}
     data["models"] = [model | {"name": name} for name, model in models.items()]
     data["comparison"] = {name: name for name in models}
 
@@ -264,8 +264,8 @@ def _hash(content: Any) -> str:
 
 @functools.cache
 def _versions() -> dict[str, str]:
-    known = machine()["versions"]
-    return {name: known[name] for name in ("multiphi-exudyn", "exudyn")}
+    versions = machine()["versions"]
+    return {name: versions[name] for name in ("multiphi-exudyn", "exudyn")}
 
 
 def _shipped_folder() -> Path:

@@ -1,4 +1,4 @@
-"""What a study found, as its template says it: what was compared, what came out, what to distrust."""
+"""Sentences about a study, from its template: what was compared, results, limits of the results."""
 
 from __future__ import annotations
 
@@ -29,33 +29,33 @@ from multiphi_exudyn.study.comparison.run_warnings import run_warnings
 from multiphi_exudyn.study.comparison.wording import percent
 from multiphi_exudyn.study.sweep.row import Row
 
-__all__ = ["error_words", "findings", "records", "shown_points", "study_warnings"]
+__all__ = ["error_text", "findings", "records", "shown_points", "study_warnings"]
 
 TEMPLATE = "findings.txt.j2"
-MOST_POINTS = 6  # of the scene's axes that pictures and tables are shown for
-BUSY = 1.5  # load average from which others were at work: the run itself makes 1
-FORGOTTEN = timedelta(minutes=4)  # after which a load average of the last minute knows nothing of an earlier load
-TICK = 1e-9  # s, of the clock: no time is shorter
-UNSTEADY = 2.0  # longest over shortest repeat from which a time is worth a word
+MOST_POINTS = 6  # of the scene's axes shown in pictures and tables
+BUSY = 1.5  # load average above which other programs were running: the run itself causes 1
+LOAD_MEMORY = timedelta(minutes=4)  # after which a load average of one minute no longer contains an earlier load
+TICK = 1e-9  # s, resolution of the clock
+UNSTEADY = 2.0  # longest over shortest repeat above which the report mentions it
 
 
 def findings(result: StudyResult) -> dict[str, tuple[str, ...]]:
-    """Sentences: compared, outcome, distrust; and timing, how times were taken."""
+    """Sentences by section: compared, outcome, distrust, timing."""
     return sentences(
         __package__ or "",
         TEMPLATE,
         ("compared", "outcome", "distrust", "timing"),
         result=result,
         study=result.study,
-        given=settings(result),
+        settings=settings(result),
         names=list(settings(result).method.unique()),
         places=points(result),
         full=full_methods(result),
         label=next((row.values.get("label") for row in result.rows if row.parameters["method"] == REFERENCE), None),
         explained=sum(_explained(row) for row in result.budgets),
         named=named,
-        error_words=error_words,
-        warned=study_warnings(result),
+        error_text=error_text,
+        warnings=study_warnings(result),
         **_at_one_point(result),
         **_uncertainties(result),
         **_failures(result),
@@ -64,10 +64,10 @@ def findings(result: StudyResult) -> dict[str, tuple[str, ...]]:
 
 
 def study_warnings(result: StudyResult) -> list[str]:
-    """What the models warn of, a sentence for each kind, and how long their runs are determined."""
+    """Warnings of the models, a sentence for each kind, and one about sensitivity horizons."""
     rows = [row for row in (*result.rows, *result.budgets) if row.status == "ok"]
     several = len(points(result)) > 1
-    runs = [(_run_words(row.parameters, several), _warnings(row)) for row in rows]
+    runs = [(_run_text(row.parameters, several), _warnings(row)) for row in rows]
     own = settings(result)
     horizons = [
         (named(method, setting), measures.get("horizon_s", {}))
@@ -82,41 +82,41 @@ def shown_points(result: StudyResult) -> list[Mapping[str, Any]]:
     return (timed or points(result))[:MOST_POINTS]
 
 
-def error_words(error: float | None, own: float | None) -> str:
-    """An error; one below the reference's own uncertainty only as that."""
+def error_text(error: float | None, own: float | None) -> str:
+    """An error as text; one below the uncertainty of the reference only as its bound."""
     if error is not None and own is not None and error <= own:
         return f"≤ {percent(own)} (uncertainty)"
     return percent(error)
 
 
 def records(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """The lines of a table as a template takes them, None where there is nothing."""
-    found = table.astype(object).where(table.notna(), None).to_dict("records")
-    return [{str(name): value for name, value in line.items()} for line in found]
+    """Rows of a table as dicts, with None for missing values."""
+    rows = table.astype(object).where(table.notna(), None).to_dict("records")
+    return [{str(name): value for name, value in line.items()} for line in rows]
 
 
-def _run_words(parameters: Mapping[str, Any], several: bool) -> str:
-    """A run, in words of its own; several: whether it has its point of the scene's axes in them."""
+def _run_text(parameters: Mapping[str, Any], several: bool) -> str:
+    """A run as text; several: whether the text includes the point of the scene's axes."""
     at = parameters["at"] if several else {}
     near = "".join(f", {field} × {factor:g}" for field, factor in parameters["nearby"].items())
     return named(parameters["method"], {**parameters["setting"], **at}) + near
 
 
 def _warnings(row: Row) -> list[str]:
-    """Of a run; of a budget those of its rungs."""
+    """Warnings of a run, or of the rungs of a budget."""
     rungs = row.values.get("rungs", {}).values()
     return list(row.values.get("warnings", [sentence for rung in rungs for sentence in rung["warnings"]]))
 
 
 def _explained(row: Row) -> bool:
-    """Whether a budget's parts explain all of its differences that are known."""
+    """Whether the parts of a budget add up to all of its differences."""
     groups = [each["all"] for ladders in row.values.get("windows", {}).values() for each in ladders.values()]
-    known = [group["explained"] for group in groups if group is not None]
-    return bool(known) and all(known)
+    explained = [group["explained"] for group in groups if group is not None]
+    return bool(explained) and all(explained)
 
 
 def _at_one_point(result: StudyResult) -> dict[str, Any]:
-    """Of one point the cheapest for each tolerance and the most accurate; of several every method over all of them."""
+    """Values for the template: cheapest and most accurate settings at a single point, or errors over all points."""
     if len(points(result)) != 1:
         table = over_all_points(result).sort_values(["points", "worst"], ascending=[False, True], kind="stable")
         best = table.groupby("method", sort=False).head(1).sort_index()
@@ -140,7 +140,7 @@ def _cheapest(result: StudyResult, at: Mapping[str, Any], tolerance: float) -> d
 
 
 def _uncertainties(result: StudyResult) -> dict[str, Any]:
-    """How far the reference's coarser copy is off at most, and until when [s] the two agree, if not throughout."""
+    """Values for the template: largest error of the coarser copy, and its agreement horizons [s] before the end."""
     coarser = result.table[result.table.method == COARSER].sort_values("own_error", ascending=False, kind="stable")
     at: Mapping[str, Any] = next(iter(coarser["at"]), {})
     own = uncertainty(result, at)
@@ -180,11 +180,11 @@ def _times(result: StudyResult) -> dict[str, Any]:
 
 
 def _loads(result: StudyResult) -> list[float]:
-    """The machine's load averages while settings were timed, where the system tells them.
+    """Load averages of the machine during the timing pass, if the system has them.
 
-    Those of the first minutes, which still remember what ran before, do not count.
+    Those of the first minutes are left out, since they contain the load before.
     """
     ended = [datetime.fromisoformat(row.finished.replace("Z", "+00:00")) for row in result.timings]
-    late = [row for row, at in zip(result.timings, ended, strict=True) if at - min(ended) > FORGOTTEN]
+    late = [row for row, at in zip(result.timings, ended, strict=True) if at - min(ended) > LOAD_MEMORY]
     given = [row.values["load_average"] for row in late if row.status == "ok"]
     return [load for load in given if load is not None]

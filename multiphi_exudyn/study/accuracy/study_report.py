@@ -28,7 +28,7 @@ from multiphi_exudyn.study.accuracy.analysis import (
 )
 from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
 from multiphi_exudyn.study.accuracy.map_figure import map_figure
-from multiphi_exudyn.study.accuracy.study_findings import error_words, findings, records, shown_points
+from multiphi_exudyn.study.accuracy.study_findings import error_text, findings, records, shown_points
 from multiphi_exudyn.study.accuracy.study_result import StudyResult
 from multiphi_exudyn.study.comparison.pages import Picture, environment_of
 from multiphi_exudyn.study.comparison.wording import percent, seconds
@@ -39,33 +39,33 @@ __all__ = ["render_study"]
 TEMPLATE = "study.html.j2"
 MOST_FAILURES = 100  # listed on the page; the CSV file has all
 PARETO = (
-    "A line joins those settings of a method that none of its other settings beats in both time and error. In the "
-    "grey band a model is as good as the reference can tell. Thin lines: the tolerances of the table below. "
+    "The line of a method joins its Pareto-optimal settings: no other setting is better in both time and error. Errors "
+    "in the grey band are below the uncertainty of the reference. Thin lines: the tolerances of the table below. "
     "Colours are the same in all pictures."
 )
 CONVERGENCE = (
-    "In brackets: the other fields, each at its finest. Order: observed between neighbouring values. ×: failed."
+    "In brackets: the other fields, each at its finest value. Order: observed between neighbouring values. ×: failed."
 )
-ALONG = "Every method at its finest setting; gaps: failed."
-RESPONSE = "The reference, at the points of the scene's axes."
+ALONG = "Every method at its finest setting; a gap in a line is a failed run."
+RESPONSE = "Response of the reference at the points of the scene's axes."
 INDICATOR = (
-    "Every run that has an indicator, nearby ones included. On the line the prediction is exact. It predicts what "
-    "truncation costs, not what a contact law other than the reference's does."
+    "All runs with an indicator, nearby ones included. On the line the prediction is exact. The indicator predicts the "
+    "error of modal truncation, not that of a contact law other than the reference's."
 )
 BUDGET = (
     "Bars: size of each part, whiskers its uncertainty, numbers its share of the whole difference in %. "
     "Pale: no larger than its uncertainty. Dashed line: the whole difference between full and reduced."
 )
 MAPS = (
-    "The reference and {}. Dashed: natural frequencies of the levels [Hz]. Hatched: the ends of the record show. "
-    "Grey bars on top: in contact."
+    "The reference and {}. Dashed: natural frequencies of the levels [Hz]. Hatched: affected by the ends of the "
+    "record. Grey bars on top: in contact."
 )
 
 
 def render_study(result: StudyResult) -> str:
     """The page as HTML."""
     environment = environment_of(__package__ or "")
-    environment.filters |= {"words": words, "cell": cell_words}
+    environment.filters |= {"words": words, "cell": cell_text}
     shown = [_point(result, at) for at in shown_points(result)]
     timed = [point for point in shown if point["pareto"]]
     return environment.get_template(TEMPLATE).render(
@@ -82,9 +82,9 @@ def render_study(result: StudyResult) -> str:
         zoom=[study_figures.error_against_time(result, point["at"], k) for k, point in enumerate(timed)],
         count=len(points(result)),
         kinds=[False, True] if any(method.refine for method in result.study.methods) else [False],
-        cheapest=lambda *asked: records(cheapest(result, *asked)),
+        cheapest=lambda *options: records(cheapest(result, *options)),
         full=full_methods(result),
-        error_words=error_words,
+        error_text=error_text,
         overall=_overall(result) if len(points(result)) > 1 else None,
         response=_drawn(study_figures.response_figure(result), RESPONSE),
         along=[_along(result, axis) for axis in numeric_axes(result.table, "at")],
@@ -98,7 +98,7 @@ def render_study(result: StudyResult) -> str:
     )
 
 
-def cell_words(value: float | None, quantity: str) -> str:
+def cell_text(value: float | None, quantity: str) -> str:
     """A cell of a table along an axis, with its unit."""
     if value is None or math.isnan(value):
         return "–"
@@ -136,10 +136,10 @@ def _drawn(figure: Figure | None, caption: str) -> Picture | None:
 def _overall(result: StudyResult) -> pd.DataFrame:
     """Every setting over all points, in words."""
     table = over_all_points(result).set_index("method")
-    words_of = {"median": percent, "worst": percent, "online_s": seconds}
-    named = {"points": "points with an error", "median": "error, median", "worst": "error, largest"}
-    in_words = table.assign(**{column: table[column].map(tell) for column, tell in words_of.items()})
-    return in_words.rename(columns={**named, "online_s": "online, median"}).rename_axis(index=None, columns="method")
+    text_of = {"median": percent, "worst": percent, "online_s": seconds}
+    headings = {"points": "points with an error", "median": "error, median", "worst": "error, largest"}
+    texts = table.assign(**{column: table[column].map(text) for column, text in text_of.items()})
+    return texts.rename(columns={**headings, "online_s": "online, median"}).rename_axis(index=None, columns="method")
 
 
 def _along(result: StudyResult, axis: str) -> tuple[str, Picture, list[pd.DataFrame]]:
@@ -148,8 +148,8 @@ def _along(result: StudyResult, axis: str) -> tuple[str, Picture, list[pd.DataFr
     for column, table in tables_along(result, axis).items():
         quantity, _, name = column.partition(".")
         label = metrics.METRICS[quantity].label if quantity in metrics.METRICS else "error"
-        in_words = table.map(cell_words, quantity=quantity).rename(columns="{:g}".format)
-        tables.append(in_words.rename_axis(index=None, columns=", ".join(filter(None, (label, name)))))
+        texts = table.map(cell_text, quantity=quantity).rename(columns="{:g}".format)
+        tables.append(texts.rename_axis(index=None, columns=", ".join(filter(None, (label, name)))))
     return axis, Picture.of(study_figures.along_figure(result, axis), ALONG), tables
 
 

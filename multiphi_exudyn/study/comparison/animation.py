@@ -1,9 +1,9 @@
-"""A reduced model and its reference moving over each other in slow motion, as a GIF by matplotlib's PillowWriter.
+"""Slow-motion animation of a reduced model and its reference, as a GIF by matplotlib's PillowWriter.
 
 One panel for each beam: the deflection w(x, t) of both models at the nodes of the mesh they are made from (every node
-is a point of the structure here, which leaves matrices and mesh as they are), and where each contact would touch it,
-z(t) = w(x_c, t) - g(t) / c with gap g and coefficient c, so a stop that moves, or the other beam, is seen to move. The
-last panel: the judged point that moves most.
+is made a point of the structure; matrices and mesh stay the same), and the position of each stop,
+z(t) = w(x_c, t) - g(t) / c with gap g and coefficient c, so that moving stops and other beams move in the picture. The
+last panel shows the history of the judged point that moves most.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.study.comparison.beam_places import coefficients
 from multiphi_exudyn.study.comparison.figure_style import BAND, COLOURS, REFERENCE, STYLE, panels
-from multiphi_exudyn.study.comparison.plots import greyed
+from multiphi_exudyn.study.comparison.plots import grey_spans
 from multiphi_exudyn.study.comparison.wording import seconds
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
@@ -35,27 +35,27 @@ from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import Scene
 from multiphi_exudyn.study.scene.workbench import Workbench, mesh_nodes, prepare
 
-__all__ = ["FRAME_RATE", "Stage", "gif", "moving_figure", "stage_of"]
+__all__ = ["FRAME_RATE", "AnimatedScene", "gif", "moving_figure", "stage_of"]
 
 FRAME_RATE = 25.0  # frames a second
-PERIOD_SHOWN = 10.0  # s, for the longest period of the open structure: bounces of a hundredth of it last several frames
-LONGEST = 40.0  # s, of an animation whose slow motion nobody has chosen
-MOST_FRAMES = 3000  # two minutes: beyond that a typing error is likelier than a wish
+PERIOD_SHOWN = 10.0  # s of animation for the longest period of the open structure: short bounces last several frames
+LONGEST = 40.0  # s, of an animation with the default slow motion
+MOST_FRAMES = 3000  # two minutes: more is probably a typing error
 RESOLUTION = 76  # dots per inch: 700 pixels wide
 COLOUR_COUNT = 48
 MARGIN = 0.12  # of the range of the heights, above and below
 CLOSED, OPEN = "#D55E00", "#BBBBBB"
 WIDTHS = (2.0, 4.5)  # points, of the reduced model and of the reference below it
 
-Move = Callable[[int], None]  # what a part of the picture does at a frame
+Move = Callable[[int], None]  # updates a part of the picture to a frame
 
 
 @dataclass(frozen=True)
-class Stage:
-    """A scene whose beams' nodes are points of the bench; beams: name -> x (k,) [m] of its nodes, and their names.
+class AnimatedScene:
+    """A scene prepared for an animation: the nodes of its beams are points of the structure.
 
-    models: names of the reduced model and of the reference; judged: points of which one is followed; slow: how many
-    times slower than it happens.
+    models: names of the reduced model and of the reference. judged: judged points. beams: name -> x (k,) [m] and point
+    names of its nodes. slow: slow-motion factor.
     """
 
     bench: Workbench
@@ -66,11 +66,11 @@ class Stage:
 
     @property
     def time(self) -> np.ndarray:
-        """Of the frames [s]."""
+        """Times of the frames [s]."""
         return np.arange(0.0, self.bench.t_end, 1 / (FRAME_RATE * self.slow))
 
     def runs(self, progress: bool) -> dict[str, ModelRun]:
-        """Both models, run; a failed one has its cause."""
+        """Run both models; a failed run has its cause."""
         return {name: run_model(self.bench, name, progress, retry=True) for name in self.models}
 
     def at(self, run: ModelRun, point: str) -> np.ndarray:
@@ -78,12 +78,14 @@ class Stage:
         return 1e3 * np.interp(self.time, run.time, run.points[point])
 
 
-def stage_of(scene: Scene, model: str | None = None, reference: str | None = None, slow: float | None = None) -> Stage:
-    """Check what is asked for and build what both models share; none asked for: the scene's own.
+def stage_of(
+    scene: Scene, model: str | None = None, reference: str | None = None, slow: float | None = None
+) -> AnimatedScene:
+    """Prepare the animation of a model and a reference; None: those of the scene. slow: slow-motion factor.
 
-    Raises MultiPhiValueError, one line, for a model that cannot be drawn, matrices, and no or endless length.
+    Raises MultiPhiValueError for a model that cannot be drawn, for matrices, and for a length out of range.
     """
-    models = _chosen(scene, model, reference)
+    models = _model_names(scene, model, reference)
     scene = _changed(scene, comparison=scene.file.comparison.model_copy(update={"reference": models[1]}))
     mechanics = mechanics_of(scene)
     beams = mechanics.beams
@@ -94,12 +96,13 @@ def stage_of(scene: Scene, model: str | None = None, reference: str | None = Non
     nodes = {name: (x, tuple(f"{name}.{node}" if name else node for node in added[name])) for name, x in mesh.items()}
     parts = {name: replace(beam, points={**beam.points, **added[name]}) for name, beam in beams.parts.items()}
     judged = scene.file.outputs.judged_points or scene.file.outputs.points or mechanics.points
-    touched = [point for contact in mechanics.contacts for point in coefficients(contact)]
-    shown = tuple(dict.fromkeys([*judged, *touched, *(point for _, points in nodes.values() for point in points)]))
+    contact_points = [point for contact in mechanics.contacts for point in coefficients(contact)]
+    node_points = [point for _, points in nodes.values() for point in points]
+    shown = tuple(dict.fromkeys([*judged, *contact_points, *node_points]))
     scene = _changed(scene, outputs=scene.file.outputs.model_copy(update={"points": shown}))
     bench = replace(prepare(scene, replace(mechanics, beams=replace(beams, parts=parts))), repeats=1)
-    return Stage(
-        bench, models, tuple(judged), nodes, _slow_motion(bench) if slow is None else _checked(slow, bench.t_end)
+    return AnimatedScene(
+        bench, models, tuple(judged), nodes, _slow_motion(bench) if slow is None else _checked_factor(slow, bench.t_end)
     )
 
 
@@ -107,14 +110,14 @@ def _changed(scene: Scene, **fields: Any) -> Scene:
     return replace(scene, file=scene.file.model_copy(update=fields))
 
 
-def gif(stage: Stage, runs: Mapping[str, ModelRun], drawn: Callable[[], object] = lambda: None) -> bytes:
-    """The animation of two finished runs, starting again at its end; drawn: called after every frame."""
-    figure, move = moving_figure(stage, runs)
+def gif(animated: AnimatedScene, runs: Mapping[str, ModelRun], drawn: Callable[[], object] = lambda: None) -> bytes:
+    """Return the animation of two finished runs as an endless GIF; drawn: called after every frame."""
+    figure, move = moving_figure(animated, runs)
     writer = _FewColours(fps=int(FRAME_RATE))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "animation.gif"
         with writer.saving(figure, path, RESOLUTION):
-            for frame in range(len(stage.time)):
+            for frame in range(len(animated.time)):
                 move(frame)
                 writer.grab_frame()
                 drawn()
@@ -122,14 +125,14 @@ def gif(stage: Stage, runs: Mapping[str, ModelRun], drawn: Callable[[], object] 
 
 
 class _FewColours(PillowWriter):
-    """Frames with one palette of few colours: a file a quarter as large."""
+    """Writer with one palette of few colours for all frames: a quarter of the file size."""
 
     _frames: list[Image.Image]
 
     def finish(self) -> None:
         """Write all frames."""
         sample = self._frames[0].convert("RGB")
-        sample.paste(CLOSED, (0, 0, 60, 60))  # a colour that the first frame need not have
+        sample.paste(CLOSED, (0, 0, 60, 60))  # the first frame may lack this colour
         palette = sample.quantize(COLOUR_COUNT, dither=Image.Dither.NONE)
         frames = [frame.convert("RGB") for frame in self._frames]
         self._frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
@@ -137,29 +140,29 @@ class _FewColours(PillowWriter):
 
 
 @rc_context(STYLE | {"axes.grid": False, "legend.fontsize": 9})
-def moving_figure(stage: Stage, runs: Mapping[str, ModelRun]) -> tuple[Figure, Move]:
-    """The picture of both runs, and what brings it to a frame."""
-    reduced, reference = (runs[name] for name in stage.models)
-    figure, axes = panels([*[2.6] * len(stage.beams), 2.3])
+def moving_figure(animated: AnimatedScene, runs: Mapping[str, ModelRun]) -> tuple[Figure, Move]:
+    """Figure of both runs, and the function that updates it to a frame."""
+    reduced, reference = (runs[name] for name in animated.models)
+    figure, axes = panels([*[2.6] * len(animated.beams), 2.3])
     moves: list[Move] = []
     for run, colour, width in ((reference, REFERENCE, WIDTHS[1]), (reduced, COLOURS[0], WIDTHS[0])):
-        for (beam, (x, nodes)), panel in zip(stage.beams.items(), axes, strict=False):
+        for (beam, (x, nodes)), panel in zip(animated.beams.items(), axes, strict=False):
             (line,) = panel.plot(x, x, color=colour, lw=width, label=run.name)
-            moves += [_shape(line, np.array([stage.at(run, node) for node in nodes]))]
-            moves += _stops(stage, run, beam, panel, 2 * width)
-        values = stage.at(run, _followed(stage, run))
-        axes[-1].plot(stage.time, values, color=OPEN, lw=width / 2, zorder=0)
+            moves += [_shape(line, np.array([animated.at(run, node) for node in nodes]))]
+            moves += _stops(animated, run, beam, panel, 2 * width)
+        values = animated.at(run, _most_mobile_point(animated, run))
+        axes[-1].plot(animated.time, values, color=OPEN, lw=width / 2, zorder=0)
         (line,) = axes[-1].plot([], [], color=colour, lw=width / 2, marker="o", ms=width, markevery=[-1])
-        moves.append(_history(line, stage.time, values))
-    _frame(stage, runs, figure, axes)
+        moves.append(_history(line, animated.time, values))
+    _frame(animated, runs, figure, axes)
     clock = axes[-1].set_title("", fontsize=10, loc="right")
     figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # placed once, not in every frame
+    figure.set_layout_engine("none")  # computed once, not in every frame
 
     def move(frame: int) -> None:
         for each in moves:
             each(frame)
-        clock.set_text(f"t = {stage.time[frame]:.3f} s")
+        clock.set_text(f"t = {animated.time[frame]:.3f} s")
 
     return figure, move
 
@@ -172,18 +175,18 @@ def _history(line: Line2D, time: np.ndarray, values: np.ndarray) -> Move:
     return lambda frame: line.set_data(time[: frame + 1], values[: frame + 1])
 
 
-def _stops(stage: Stage, run: ModelRun, beam: str, axes: Axes, size: float) -> Iterator[Move]:
-    """Where each contact of a beam would touch it: a mark that changes its colour while the contact is closed."""
-    beams = stage.bench.mechanics.beams
-    assert beams is not None, "checked when the stage was built"
-    for contact in stage.bench.mechanics.contacts:
-        closed = _closed(run.contact_intervals[contact.name], stage.time)
-        gap = 1e3 * np.interp(stage.time, run.time, run.gaps[contact.name])
+def _stops(animated: AnimatedScene, run: ModelRun, beam: str, axes: Axes, size: float) -> Iterator[Move]:
+    """Draw the stop of each contact of a beam as a mark, which changes its colour while the contact is closed."""
+    beams = animated.bench.mechanics.beams
+    assert beams is not None, "checked in stage_of"
+    for contact in animated.bench.mechanics.contacts:
+        closed = _closed(run.contact_intervals[contact.name], animated.time)
+        gap = 1e3 * np.interp(animated.time, run.time, run.gaps[contact.name])
         for point, c in coefficients(contact).items():
             name, along = beams.points[point]
             if name == beam:
                 (mark,) = axes.plot([along], [0], marker="^" if c > 0 else "v", ms=size, ls="none", zorder=3)
-                yield _stop(mark, stage.at(run, point) - gap / c, closed)
+                yield _stop(mark, animated.at(run, point) - gap / c, closed)
 
 
 def _stop(mark: Line2D, z: np.ndarray, closed: np.ndarray) -> Move:
@@ -193,59 +196,61 @@ def _stop(mark: Line2D, z: np.ndarray, closed: np.ndarray) -> Move:
     return move
 
 
-def _frame(stage: Stage, runs: Mapping[str, ModelRun], figure: Figure, axes: list[Axes]) -> None:
-    """Room for everything at any time, names, and grey where the reference is in contact."""
-    reduced, reference = (runs[name] for name in stage.models)
-    for (beam, (_, nodes)), panel in zip(stage.beams.items(), axes, strict=False):
-        z = np.array([stage.at(run, node) for run in runs.values() for node in nodes])
+def _frame(animated: AnimatedScene, runs: Mapping[str, ModelRun], figure: Figure, axes: list[Axes]) -> None:
+    """Set limits, labels and titles, and shade the times at which the reference is in contact."""
+    reduced, reference = (runs[name] for name in animated.models)
+    for (beam, (_, nodes)), panel in zip(animated.beams.items(), axes, strict=False):
+        z = np.array([animated.at(run, node) for run in runs.values() for node in nodes])
         room = MARGIN * np.ptp(z) or 1.0
         panel.set(ylim=(np.min(z) - room, np.max(z) + room), ylabel=f"{beam} w [mm]".strip())
     axes[-2].set_xlabel("x [m]")
-    spans, grey = greyed(reference)
+    spans, meaning = grey_spans(reference)
     for start, end in spans:
         axes[-1].axvspan(start, end, color=BAND, lw=0, zorder=-1)
-    axes[-1].set(xlabel="time [s]", ylabel=f"{_followed(stage, reference)} [mm]", xlim=(0.0, stage.time[-1]))
-    axes[-1].set_title(grey and f"grey: {grey}", fontsize=9)
+    axes[-1].set(
+        xlabel="time [s]", ylabel=f"{_most_mobile_point(animated, reference)} [mm]", xlim=(0.0, animated.time[-1])
+    )
+    axes[-1].set_title(meaning and f"grey: {meaning}", fontsize=9)
     axes[0].legend(loc="upper left")
-    title = f"{stage.bench.scene.file.title}, {stage.slow:g} times slower than it happens"
-    took = "; ".join(f"{run.label}: {seconds(run.online_s)}" for run in (reduced, reference))
-    figure.suptitle(f"{title}\ncomputed in: {took}", fontsize=9)
+    title = f"{animated.bench.scene.file.title}, {animated.slow:g} times slower than in reality"
+    run_times = "; ".join(f"{run.label}: {seconds(run.online_s)}" for run in (reduced, reference))
+    figure.suptitle(f"{title}\ncomputed in: {run_times}", fontsize=9)
 
 
-def _followed(stage: Stage, run: ModelRun) -> str:
+def _most_mobile_point(animated: AnimatedScene, run: ModelRun) -> str:
     """The judged point that moves most."""
-    return max(stage.judged, key=lambda name: float(np.ptp(run.points[name])))
+    return max(animated.judged, key=lambda name: float(np.ptp(run.points[name])))
 
 
 def _closed(intervals: np.ndarray, time: np.ndarray) -> np.ndarray:
     return np.any((intervals[:, :1] <= time) & (time <= intervals[:, 1:]), axis=0)
 
 
-def _chosen(scene: Scene, model: str | None, reference: str | None) -> tuple[str, str]:
-    """Names of the two models; a Craig-Bampton component would get every node as an interface point."""
-    drawn = [name for name, spec in scene.models.items() if spec.kind != "craig-bampton"]
-    reduced = [name for name in drawn if scene.models[name].kind != "full"]
+def _model_names(scene: Scene, model: str | None, reference: str | None) -> tuple[str, str]:
+    """Names of the two models; not Craig-Bampton, which would have every node as an interface point."""
+    drawable = [name for name, spec in scene.models.items() if spec.kind != "craig-bampton"]
+    reduced = [name for name in drawable if scene.models[name].kind != "full"]
     if not reduced:
         raise MultiPhiValueError(f"{scene.path}: models: got none that is reduced, need one to draw")
     return (
-        _known("--model", reduced[0] if model is None else model, reduced),
-        _known("--reference", scene.file.comparison.reference if reference is None else reference, drawn),
+        _checked_name("--model", reduced[0] if model is None else model, reduced),
+        _checked_name("--reference", scene.file.comparison.reference if reference is None else reference, drawable),
     )
 
 
-def _known(option: str, given: str, known: list[str]) -> str:
-    if given not in known:
-        raise MultiPhiValueError(f"{option}: got {given!r}, need {one_of(given, known)}")
-    return given
+def _checked_name(option: str, name: str, allowed: list[str]) -> str:
+    if name not in allowed:
+        raise MultiPhiValueError(f"{option}: got {name!r}, need {one_of(name, allowed)}")
+    return name
 
 
 def _slow_motion(bench: Workbench) -> float:
-    """Slow enough to see bounces, in an animation that is not too long; one significant digit."""
+    """Default slow-motion factor, to one digit: bounces are visible, and the animation is at most LONGEST."""
     factor = min(PERIOD_SHOWN / bench.longest_period or math.inf, LONGEST / bench.t_end)
     return float(f"{factor:.0e}")
 
 
-def _checked(slow: float, t_end: float) -> float:
+def _checked_factor(slow: float, t_end: float) -> float:
     least, most = 2 / (FRAME_RATE * t_end), MOST_FRAMES / (FRAME_RATE * t_end)
     if not least <= slow <= most:
         raise MultiPhiValueError(f"--slow: got {slow:g}, need {least:.4g} to {most:.4g} for {t_end:g} s")

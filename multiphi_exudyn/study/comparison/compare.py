@@ -22,9 +22,9 @@ from multiphi_exudyn.study.scene.model_kinds import ReducedModel, UserObjectMode
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF, Workbench
 from multiphi_exudyn.study.sweep.row import plain
 
-__all__ = ["LISTED", "Comparison", "compare", "histories", "summary"]
+__all__ = ["MOST_LISTED", "Comparison", "compare", "histories", "summary"]
 
-LISTED = 4  # contacts that pages tell of one by one; of more, what they did together
+MOST_LISTED = 4  # contacts that pages tell of one by one; of more, what they did together
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Comparison:
         return {name: self.runs[name] for name in rigid_models(self.bench) if self.runs[name].ok}
 
     @property
-    def nudged(self) -> tuple[str, ...]:
+    def horizon_tolerances(self) -> tuple[str, ...]:
         """Tolerances for which runs know their sensitivity horizon."""
         return tuple(dict.fromkeys(tolerance for run in self.runs.values() for tolerance in run.horizon_s))
 

@@ -1,7 +1,7 @@
-"""How the pictures of reports look, and how a page holds them.
+"""Style of the figures in reports, and their encoding for a page.
 
 Colours are Okabe and Ito's colour-blind-safe set, one for each model in all pictures of a page; references and full
-models are black and grey. ``STYLE`` goes round whatever draws: ``@rc_context(STYLE)``.
+models are black and grey. Functions that draw use ``@rc_context(STYLE)``.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ __all__ = [
     "Style",
     "data_uri",
     "legend_below",
+    "milliseconds_axis",
     "note",
     "panels",
     "percent_axis",
@@ -61,7 +62,7 @@ STYLE: Any = {  # rcParams
 
 @dataclass(frozen=True)
 class Style:
-    """How one model is drawn: its colour and marker, its line and the line's width [points]."""
+    """Colour, marker, line style and line width [points] of one model."""
 
     colour: str
     marker: str
@@ -70,46 +71,46 @@ class Style:
 
     @property
     def lines(self) -> dict[str, Any]:
-        """As keywords of a plot, without marks."""
+        """Keywords of a plot with a line and no markers."""
         return {"color": self.colour, "ls": self.line, "lw": self.width}
 
     @property
     def marks(self) -> dict[str, Any]:
-        """As keywords of a plot, without a line."""
+        """Keywords of a plot with markers and no line."""
         return {"color": self.colour, "ls": "None", "marker": self.marker, "ms": 6.5, "mec": "white", "mew": 0.7}
 
 
 def panels(heights: Sequence[float], sharex: bool = False) -> tuple[Figure, list[Axes]]:
-    """Panels of given heights [inches] under each other."""
+    """A figure with panels of these heights [inches], one below the other."""
     figure = Figure(figsize=(WIDTH, sum(heights)))
     return figure, list(figure.subplots(len(heights), 1, squeeze=False, sharex=sharex, height_ratios=heights)[:, 0])
 
 
 def png(figure: Figure) -> bytes:
-    """The figure as PNG."""
+    """Return the figure as a PNG file."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png")
     return buffer.getvalue()
 
 
 def data_uri(figure: Figure) -> str:
-    """The figure as a page holds it."""
+    """Return the figure as a data URI for a page."""
     return f"data:image/png;base64,{base64.b64encode(png(figure)).decode('ascii')}"
 
 
 def note(axes: Axes, text: str, at: tuple[float, float], **placing: Any) -> None:
-    """A remark at a place in shares of the axes, or in the coordinates that ``placing`` names."""
+    """Write a remark at a position in axes fractions, or in the coordinates given in ``placing``."""
     axes.annotate(text, at, fontsize=8, color=NOTE, **{"xycoords": "axes fraction"} | placing)
 
 
 def legend_below(figure: Figure, axes: Sequence[Axes], columns: int = 3, **more: Any) -> None:
-    """One for all panels, each label once."""
-    found = {label: handle for each in axes for handle, label in zip(*each.get_legend_handles_labels(), strict=True)}
-    figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=columns, **more)
+    """Draw one legend for all panels, each label once."""
+    handles = {label: handle for each in axes for handle, label in zip(*each.get_legend_handles_labels(), strict=True)}
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=columns, **more)
 
 
 def uncertainty_band(axes: Axes, own: float | None) -> None:
-    """Grey where errors [%] are smaller than the reference can tell; ``own``: its own uncertainty, a share."""
+    """Grey band of errors [%] below the reference's own uncertainty ``own`` (a fraction)."""
     if own:
         lowest, highest = axes.get_ylim()
         axes.axhspan(min(lowest, 100 * own) / 1e3, 100 * own, color=BAND, lw=0, zorder=0)
@@ -118,26 +119,32 @@ def uncertainty_band(axes: Axes, own: float | None) -> None:
 
 
 def percent_axis(axis: Axis) -> None:
-    """Values of a logarithmic axis that are percents already, written as such."""
-    _write(axis, lambda value: f"{value:g} %")
+    """Write the values [%] of a logarithmic axis with their unit."""
+    _set_formatter(axis, lambda value: f"{value:g} %")
+
+
+def milliseconds_axis(axes: Axes) -> None:
+    """Write the times [s] of a linear x axis in ms."""
+    axes.xaxis.set_major_formatter(lambda value, _: f"{1e3 * value:g}")
+    axes.set_xlabel("time [ms]")
 
 
 def seconds_axis(axis: Axis) -> None:
-    """Values of a logarithmic axis in s, with the units that read best."""
-    _write(axis, seconds)
+    """Write the times [s] of a logarithmic axis in µs, ms or s."""
+    _set_formatter(axis, seconds)
 
 
-class _Worded(LogFormatter):
-    """Ticks of a logarithmic axis in words, between its decades too where these are few."""
+class _TextFormatter(LogFormatter):
+    """Tick labels of a logarithmic axis, also between the decades where these are few."""
 
-    def __init__(self, word: Callable[[float], str]) -> None:
+    def __init__(self, text: Callable[[float], str]) -> None:
         super().__init__()
-        self.word = word
+        self.text = text
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        return self.word(x) if super().__call__(x, pos) else ""
+        return self.text(x) if super().__call__(x, pos) else ""
 
 
-def _write(axis: Axis, word: Callable[[float], str]) -> None:
-    axis.set_major_formatter(_Worded(word))
-    axis.set_minor_formatter(_Worded(word))
+def _set_formatter(axis: Axis, text: Callable[[float], str]) -> None:
+    axis.set_major_formatter(_TextFormatter(text))
+    axis.set_minor_formatter(_TextFormatter(text))

@@ -49,13 +49,13 @@ def _table(bench: Workbench, modes: list[int], rigid: bool) -> pd.DataFrame:
     start = start_configuration(bench, model)
     models = {f"r = {r}": replace(model, modes=r) for r in modes}
     counted = {
-        _start_words(bench, factor): {name: _losses(bench, each, factor * start) for name, each in models.items()}
+        _start_text(bench, factor): {name: _losses(bench, each, factor * start) for name, each in models.items()}
         for factor in FACTORS
     }
     return pd.DataFrame(counted, dtype=object)
 
 
-def _start_words(bench: Workbench, factor: float) -> str:
+def _start_text(bench: Workbench, factor: float) -> str:
     start = bench.scene.file.start
     if isinstance(start, DisplacedStart):
         return f"{1e3 * factor * start.displacement:+g} mm"

@@ -15,7 +15,7 @@ from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.study.comparison.beam_places import beam_places, coefficients
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.figure_style import COLOURS, LINE, STYLE, WIDTH
-from multiphi_exudyn.study.measures.metrics import held_levels
+from multiphi_exudyn.study.measures.metrics import level_durations
 from multiphi_exudyn.study.scene.discretised import LinearBeams
 from multiphi_exudyn.study.scene.workbench import ELEMENTS
 from reference_models.beams import NAMELESS, Beams
@@ -23,11 +23,11 @@ from reference_models.rig import PublishedLevel, published_frequencies
 
 __all__ = ["BeamShapes", "LevelModes", "level_modes", "mode_figure"]
 
-SHOWN = 4  # modes, as many as the paper's tables list
+MODE_COUNT = 4  # modes, as many as the paper's tables list
 STATIONS = 101  # places along a beam
 MOST_LEVELS = 4  # the open one, and those held longest
-LISTED = 3  # closed contacts that a level's name lists
-APART = 2.3  # between beams drawn over each other, of the largest value of a mode
+MOST_NAMED = 3  # closed contacts that a level's name lists
+BEAM_SPACING = 2.3  # between beams drawn over each other, of the largest value of a mode
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class LevelModes:
     @property
     def name(self) -> str:
         """ "open", or what is closed."""
-        if len(self.closed) > LISTED:
+        if len(self.closed) > MOST_NAMED:
             return f"{len(self.closed)} contacts closed, {self.closed[0]} to {self.closed[-1]}"
         return " and ".join(self.closed) + " closed" if self.closed else "open"
 
@@ -71,18 +71,18 @@ def level_modes(comparison: Comparison) -> tuple[LevelModes, ...]:
     if beams is None:
         return ()
     contacts = bench.contacts(rigid=bench.mechanics.parameter_set is not None)
-    held = held_levels(comparison.reference.contact_intervals, bench.t_end) if comparison.reference.ok else {}
+    held = level_durations(comparison.reference.contact_intervals, bench.t_end) if comparison.reference.ok else {}
     longest = sorted(held, key=lambda closed: -held[closed])
     alone = [(contacts[0].name,)] if len(contacts) == 1 else []
-    model, (stations, rows) = MultiPhiModel(bench.structure, contacts, modes=SHOWN), _stations(beams)
-    drawn = MultiPhiModel(stations.structure, contacts, modes=SHOWN)
+    model, (stations, rows) = MultiPhiModel(bench.structure, contacts, modes=MODE_COUNT), _stations(beams)
+    drawn = MultiPhiModel(stations.structure, contacts, modes=MODE_COUNT)
     published = published_frequencies().values() if bench.mechanics.parameter_set else ()
     return tuple(
         LevelModes(
             closed=closed,
             share=held.get(closed, 0.0) / bench.t_end if held else None,
-            frequencies=model.level(closed).frequencies[:SHOWN],
-            beams=_shapes(beams, contacts, closed, rows @ drawn.level(closed).shapes[:, :SHOWN]),
+            frequencies=model.level(closed).frequencies[:MODE_COUNT],
+            beams=_shapes(beams, contacts, closed, rows @ drawn.level(closed).shapes[:, :MODE_COUNT]),
             published=tuple(column for column in published if column.level == closed),
         )
         for closed in list(dict.fromkeys([(), *alone, *longest]))[:MOST_LEVELS]
@@ -100,7 +100,7 @@ def mode_figure(levels: Sequence[LevelModes]) -> Figure:
         for mode, axes in enumerate(row):
             _draw_mode(axes, level, mode)
         names = [beam.name for beam in level.beams] if len(level.beams) > 1 else []
-        row[0].set_yticks(-APART * np.arange(len(names)), names, fontsize=9)
+        row[0].set_yticks(-BEAM_SPACING * np.arange(len(names)), names, fontsize=9)
     return figure
 
 
@@ -146,7 +146,7 @@ def _shapes(
 
 def _draw_mode(axes: Axes, level: LevelModes, mode: int) -> None:
     for number, beam in enumerate(level.beams):
-        zero, shape = -APART * number, beam.shapes[mode]
+        zero, shape = -BEAM_SPACING * number, beam.shapes[mode]
         axes.plot(beam.x[[0, -1]], [zero, zero], color=LINE, lw=0.8)
         axes.plot(beam.x, zero + shape, color=COLOURS[0], lw=1.6)
         for places, marker, colour in ((beam.masses, "s", "#000000"), (beam.contacts, "^", "#D55E00")):

@@ -1,7 +1,7 @@
-"""The pictures of a comparison, each a Figure: histories, error against time, contact, friction, energy.
+"""Figures of a comparison: histories, error against time, contact, friction, energy.
 
-Nothing is computed here. The reference is black, its coarser copy and the other full runs are grey. Grey areas: the
-reference is in contact, as in Figs 38.8 to 38.10; in scenes without contacts its friction sticks.
+The reference is black, its coarser copy and the other full runs are grey. In grey areas the reference is in contact, as
+in Figs 38.8 to 38.10; in scenes without contacts its friction sticks.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from multiphi_exudyn.study.comparison.figure_style import (
     STYLE,
     Style,
     legend_below,
+    milliseconds_axis,
     note,
     panels,
     percent_axis,
@@ -41,10 +42,10 @@ __all__ = [
     "error_time_figure",
     "first_contact_span",
     "friction_figure",
-    "greyed",
+    "grey_spans",
     "history_figure",
     "many_contacts_figure",
-    "pictured",
+    "plotted_runs",
     "styles",
 ]
 
@@ -66,13 +67,13 @@ LOSSES = {  # row of the ledger -> label and colour
     "truncation_kinetic": ("truncation, kinetic", "#E69F00"),
     "truncation_strain": ("truncation, strain", "#CC79A7"),
 }
-SMALLEST = 1e-5  # of a history's peak: smaller differences lie below the picture, unless there are no larger ones
-SPAN = 0.01  # of the largest difference: smaller ones may lie below the picture
-BAR = 0.72  # height of a bar, of the distance of two rows
+SMALLEST = 1e-5  # of a history's peak: lower end of the axis of differences, unless all differences are smaller
+SPAN = 0.01  # of the largest difference: the axis shows at least those above it
+BAR = 0.72  # height of a bar, as a fraction of the distance between rows
 
 
 def styles(comparison: Comparison) -> dict[str, Style]:
-    """One style per model."""
+    """Style of each model."""
     drawn, colours = {}, itertools.cycle(COLOURS)
     for name, run in comparison.runs.items():
         if run is comparison.reference:
@@ -88,17 +89,17 @@ def styles(comparison: Comparison) -> dict[str, Style]:
 
 @rc_context(STYLE)
 def history_figure(comparison: Comparison, point: str) -> Figure:
-    """A point's history, its detail in the first contact if there are contacts, its difference to the reference."""
-    touches = bool(comparison.reference.contact_intervals)
-    figure, (whole, *detail, difference) = panels([3.0, 3.4, 3.0] if touches else [3.2, 3.0])
-    shown, style = [comparison.reference, *pictured(comparison)], styles(comparison)
-    spans, grey = greyed(comparison.reference)
+    """Displacement of a point, its detail in the first contact phase, and its difference to the reference."""
+    has_contacts = bool(comparison.reference.contact_intervals)
+    figure, (whole, *detail, difference) = panels([3.0, 3.4, 3.0] if has_contacts else [3.2, 3.0])
+    shown, style = [comparison.reference, *plotted_runs(comparison)], styles(comparison)
+    spans, meaning = grey_spans(comparison.reference)
     for axes in (whole, *detail):
         for run in shown:
             axes.plot(run.time, 1e3 * run.points[point], **style[run.name].lines, label=run.label)
         _shade(axes, spans)
         axes.set(xlabel="time [s]", ylabel=f"{point} [mm]")
-    whole.set(xlim=(0, comparison.bench.t_end), title=f"Displacement of {point}{grey and f'; grey: {grey}'}")
+    whole.set(xlim=(0, comparison.bench.t_end), title=f"Displacement of {point}{meaning and f'; grey: {meaning}'}")
     for axes in detail:
         _detail(axes, comparison, shown, point)
     _differences(difference, comparison, point)
@@ -110,7 +111,7 @@ def history_figure(comparison: Comparison, point: str) -> Figure:
 def error_time_figure(comparison: Comparison) -> Figure:
     """Worst NRMSE of the judged points against online time, with the reference's own uncertainty.
 
-    Hollow: rigid levels against stiff stops.
+    Hollow markers: NRMSE of rigid levels to stiff stops.
     """
     figure, (axes,) = panels([5.0])
     until, style = comparison.headline_window, styles(comparison)
@@ -137,7 +138,7 @@ def error_time_figure(comparison: Comparison) -> Figure:
 
 @rc_context(STYLE)
 def contact_figure(comparison: Comparison, contact: str) -> Figure:
-    """Contact intervals of all models under each other, whole and in the first contact phase."""
+    """Contact intervals of all models, over the whole run and in the first contact phase."""
     runs = [run for run in comparison.runs.values() if run.ok]
     figure, both = panels([0.8 + 0.23 * len(runs)] * 2)
     for axes in both:
@@ -146,6 +147,7 @@ def contact_figure(comparison: Comparison, contact: str) -> Figure:
         axes.set_yticks(range(len(runs)), [run.name for run in runs], fontsize=8)
         axes.set(ylim=(len(runs) - 0.5, -0.5), xlabel="time [s]")
         axes.grid(visible=False, axis="y")
+    milliseconds_axis(both[1])
     both[0].set(
         xlim=(0, comparison.bench.t_end), title=f"Contact {contact}: the whole run, and its first contact phase"
     )
@@ -155,8 +157,8 @@ def contact_figure(comparison: Comparison, contact: str) -> Figure:
 
 @rc_context(STYLE)
 def many_contacts_figure(comparison: Comparison) -> Figure:
-    """Every contact a row, in the scene's order: when it is closed, in the reference and in a reduced model."""
-    runs = [comparison.reference, *pictured(comparison)[:1]]
+    """Contact intervals of every contact (one row each) in the reference and in a reduced model."""
+    runs = [comparison.reference, *plotted_runs(comparison)[:1]]
     figure, rows = panels([2.8] * len(runs), sharex=True)
     for axes, run in zip(rows, runs, strict=True):
         for number, intervals in enumerate(run.contact_intervals.values(), start=1):
@@ -168,9 +170,9 @@ def many_contacts_figure(comparison: Comparison) -> Figure:
 
 @rc_context(STYLE)
 def friction_figure(comparison: Comparison, friction: str) -> Figure:
-    """Force and slip of a friction over time; grey: the reference sticks."""
+    """Force and slip of a friction over time; grey areas: the reference sticks."""
     figure, both = panels([3.2, 3.2], sharex=True)
-    for run in [comparison.reference, *pictured(comparison)]:
+    for run in [comparison.reference, *plotted_runs(comparison)]:
         for axes, values in zip(both, (run.friction_force[friction], 1e3 * run.slip[friction]), strict=True):
             axes.plot(run.time, values, **styles(comparison)[run.name].lines, label=run.label)
     for axes, label in zip(both, ("friction force [N]", "slip [mm]"), strict=True):
@@ -184,9 +186,9 @@ def friction_figure(comparison: Comparison, friction: str) -> Figure:
 
 @rc_context(STYLE)
 def energy_figure(comparison: Comparison) -> Figure:
-    """Energy over time, and where it is at the end."""
+    """Energy over time, and the energy balance at the end of the run."""
     figure, (curves, bars) = panels([3.6, 4.0])
-    for run in [comparison.reference, *pictured(comparison)]:
+    for run in [comparison.reference, *plotted_runs(comparison)]:
         if len(run.energy):
             share = 100 * run.energy / (comparison.energy_scale(run) or run.energy[0])
             curves.plot(run.energy_time, share, **styles(comparison)[run.name].lines, label=run.label)
@@ -207,15 +209,15 @@ def energy_figure(comparison: Comparison) -> Figure:
     return figure
 
 
-def pictured(comparison: Comparison) -> list[ModelRun]:
-    """Those drawn over the reference: with the scene's own number of modes, all where none has it."""
+def plotted_runs(comparison: Comparison) -> list[ModelRun]:
+    """Runs drawn with the reference: those with the scene's own number of modes, or all if no model has it."""
     specs, modes = comparison.bench.scene.models, comparison.bench.scene.file.modes
     own = [run for run in _reduced(comparison) if getattr(specs[run.name], "modes", None) == modes]
     return own or _reduced(comparison)
 
 
-def greyed(reference: ModelRun) -> tuple[np.ndarray, str]:
-    """Spans (k, 2) [s] that are drawn grey, and what happens in them; nothing where nothing touches or rubs."""
+def grey_spans(reference: ModelRun) -> tuple[np.ndarray, str]:
+    """Intervals (k, 2) [s] drawn grey, and their meaning; empty without contact and friction."""
     if reference.contact_intervals:
         return union(reference.contact_intervals.values()), "the reference is in contact"
     sticks = reference.stick_intervals
@@ -223,7 +225,7 @@ def greyed(reference: ModelRun) -> tuple[np.ndarray, str]:
 
 
 def first_contact_span(comparison: Comparison, contacts: Iterable[str] | None = None) -> tuple[float, float]:
-    """Start and end [s] of the detail around the reference's first contact phase, of some contacts or of all."""
+    """Start and end [s] of the detail around the reference's first contact phase; ``contacts``: None for all."""
     names = comparison.reference.contact_intervals if contacts is None else contacts
     phases = [phase for name in names if len(phase := comparison.first_phase(comparison.reference, name))]
     if not phases:
@@ -234,7 +236,7 @@ def first_contact_span(comparison: Comparison, contacts: Iterable[str] | None = 
 
 
 def _reduced(comparison: Comparison) -> list[ModelRun]:
-    """Reduced models and user objects that can be measured."""
+    """Runs, with an error, of all models but full ones."""
     return [run for run in comparison.measured.values() if run.kind != "full"]
 
 
@@ -249,12 +251,13 @@ def _bars(axes: Axes, intervals: np.ndarray, row: float, style: Style) -> None:
 
 
 def _detail(axes: Axes, comparison: Comparison, shown: Sequence[ModelRun], point: str) -> None:
-    """The first contact phase alone, with the places of the stops that the point alone meets."""
+    """Limit a panel to the first contact phase, and draw the stops that act on this point alone."""
     start, end = first_contact_span(comparison)
     inside = (comparison.bench.time >= start) & (comparison.bench.time <= end)
     values = np.array([1e3 * run.points[point][inside] for run in shown])
     margin = 0.06 * np.ptp(values) + 1e-9
     axes.set(xlim=(start, end), ylim=(np.min(values) - margin, np.max(values) + margin))
+    milliseconds_axis(axes)
     axes.set_title("Detail of the first contact phase")
     for contact in comparison.bench.mechanics.contacts:
         if list(coefficients(contact)) == [point]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import pandas as pd
 
 from multiphi_exudyn.study.comparison import plots
-from multiphi_exudyn.study.comparison.compare import LISTED, Comparison
+from multiphi_exudyn.study.comparison.compare import MOST_LISTED, Comparison
 from multiphi_exudyn.study.comparison.findings import findings
 from multiphi_exudyn.study.comparison.mode_shapes import LevelModes, mode_figure
 from multiphi_exudyn.study.comparison.pages import Picture, environment_of
@@ -36,20 +36,20 @@ ON_THE_PAGE = (
 )
 HISTORY = (
     "{}: the whole run, {}and the largest difference to the reference up to each time. "
-    "In the grey area a difference is no larger than the reference's to its own coarser copy."
+    "Differences in the grey area are no larger than that between the reference and its coarser copy."
 )
-COST = "Lower left is better. In the grey band a model is as good as the reference can tell. {}"
-HOLLOW = "Hollow: rigid levels against stiff stops. "
-CONTACT = "A bar is a time span in contact."
-MANY = "A bar is a time span in contact; contacts are numbered in the order of the scene."
-FRICTION = "The force against the motion, and how far the patch has slipped on its counter-surface."
-ENERGY = "Where a bar ends below 100 %, time integration has lost energy; above, it has gained energy."
+COST = "Lower left is better. Errors in the grey band are below the uncertainty of the reference. {}"
+HOLLOW = "Hollow markers: error of rigid levels against stiff stops. "
+CONTACT = "Each bar is a contact interval."
+MANY = "Each bar is a contact interval; contacts are numbered in the order of the scene."
+FRICTION = "Friction force, and how far the patch has slipped on its counter-surface."
+ENERGY = "A bar that ends below 100 % shows energy lost by time integration, above 100 % energy gained."
 MODES = "Square: point mass. Triangle: closed contact, {}. All modes are scaled to the same largest value."
-RIGID, COMPLIANT = "rigid, as in the published tables", "a spring of the scene's stiffness, so the point there moves"
+RIGID, COMPLIANT = "rigid, as in the published tables", "a spring of the scene's stiffness, so that its point moves"
 
 
 def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Mapping[str, pd.DataFrame]) -> str:
-    """The page as HTML."""
+    """Return the report of a comparison as an HTML page."""
     bench = comparison.bench
     contradiction = rig().contradiction if bench.mechanics.parameter_set else ""
     pictures = defaultdict[str, list[Picture]](list)
@@ -66,7 +66,7 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Mapping
             assumptions=[each for each in bench.mechanics.assumptions if each != contradiction],
             environment=comparison.environment,
             comparison=comparison,
-            bench=bench,
+            setup=bench,
             scene=bench.scene,
             levels=levels,
             losses=losses,
@@ -74,7 +74,7 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Mapping
             errors=_errors(comparison),
             stiff_errors=_stiff_errors(comparison, comparison.stiff) if comparison.stiff and comparison.rigid else None,
             pictures=pictures,
-            totals=contact_totals(comparison) if len(bench.mechanics.contacts) > LISTED else None,
+            totals=contact_totals(comparison) if len(bench.mechanics.contacts) > MOST_LISTED else None,
             zoom=histories_to_zoom(comparison),
             contradiction=contradiction,
         )
@@ -82,22 +82,22 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Mapping
 
 
 def contact_totals(comparison: Comparison) -> pd.DataFrame:
-    """What the contacts of each model that ran did together."""
+    """Totals over all contacts, one row for each run that is ok."""
     return pd.DataFrame(
         {name: _totals(run, comparison.bench.t_end) for name, run in comparison.runs.items() if run.ok}
     ).T
 
 
 def _totals(run: ModelRun, t_end: float) -> dict[str, object]:
-    counts = [len(given) for given in run.contact_intervals.values()]
-    held = metrics.held_levels(run.contact_intervals, t_end)
+    counts = [len(intervals) for intervals in run.contact_intervals.values()]
+    durations = metrics.level_durations(run.contact_intervals, t_end)
     together = metrics.union(run.contact_intervals.values())
     first = metrics.first_contact(together)
     return {
         "contacts touched": sum(count > 0 for count in counts),
         "contacts made": sum(counts),
-        "most at once": max(map(len, held)),
-        "sets of closed contacts": len(held),
+        "most at once": max(map(len, durations)),
+        "sets of closed contacts": len(durations),
         "first contact": "–" if first is None else f"{1e3 * first:.3f} ms",
         "time with any contact": seconds(metrics.closed_time(together)),
         "impulse of all": f"{sum(run.impulse.values()):.4g} N s" if run.impulse else "–",
@@ -105,35 +105,37 @@ def _totals(run: ModelRun, t_end: float) -> dict[str, object]:
 
 
 def _errors(comparison: Comparison) -> pd.DataFrame:
-    """Errors by window and point, and until when runs agree with the reference and with themselves, nudged."""
+    """Errors by window and point, agreement horizons and sensitivity horizons, one row for each run."""
     end, tolerances = comparison.bench.t_end, comparison.bench.scene.file.outputs.tolerances
 
-    def until(given: float | None) -> str:
-        return "–" if given is None else "whole run" if given >= ROUND_OFF * end else f"{given:.3f} s"
+    def horizon_text(time: float | None) -> str:
+        return "–" if time is None else "whole run" if time >= ROUND_OFF * end else f"{time:.3f} s"
 
     lines = {}
     for name, run in comparison.measured.items():
-        agreement = {("agreement horizon", share(each)): until(comparison.horizon(run, each)) for each in tolerances}
-        nudged = {each: until(run.horizon_s.get(each)) for each in comparison.nudged}
-        own = {("sensitivity horizon", share(float(each))): told for each, told in nudged.items()}
-        lines[name] = _by_window(comparison.errors(run)) | agreement | own
+        agreement = {
+            ("agreement horizon", share(each)): horizon_text(comparison.horizon(run, each)) for each in tolerances
+        }
+        sensitivity = {each: horizon_text(run.horizon_s.get(each)) for each in comparison.horizon_tolerances}
+        sensitivity_columns = {("sensitivity horizon", share(float(each))): text for each, text in sensitivity.items()}
+        lines[name] = _by_window(comparison.errors(run)) | agreement | sensitivity_columns
     return pd.DataFrame(lines).T
 
 
 def _stiff_errors(comparison: Comparison, stiff: StiffStops) -> pd.DataFrame:
-    """Of rigid levels against stiff stops, and the stiff stops' own."""
+    """Errors of rigid levels against stiff stops, and the uncertainty of this reference."""
     values = stiff.values(comparison.bench, comparison.rigid)
     tables = values["errors"] | {"own uncertainty": values["uncertainty"]}
     return pd.DataFrame({name: _by_window(table) for name, table in tables.items()}).T
 
 
 def _by_window(table: Mapping[str, Mapping[str, float | None]]) -> dict[tuple[str, str], str]:
-    """In words, as columns."""
+    """Columns (window, point) of errors as text."""
     return {(f"to {end} s", point): percent(error) for end, errors in table.items() for point, error in errors.items()}
 
 
 def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterator[tuple[str, Picture]]:
-    """Each with the section it belongs to."""
+    """Pairs of a section's name and a picture."""
     reference = comparison.reference
     if reference.ok:
         detail = "the first contact phase, " if reference.contact_intervals else ""
@@ -141,7 +143,7 @@ def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterator[
             yield "histories", Picture.of(plots.history_figure(comparison, point), HISTORY.format(point, detail))
         cost = COST.format(HOLLOW if comparison.rigid else "")
         yield "cost", Picture.of(plots.error_time_figure(comparison), cost)
-        if len(reference.contact_intervals) > LISTED:
+        if len(reference.contact_intervals) > MOST_LISTED:
             yield "contact", Picture.of(plots.many_contacts_figure(comparison), MANY)
         else:
             for contact in reference.contact_intervals:

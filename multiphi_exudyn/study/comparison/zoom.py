@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from multiphi_exudyn.study.comparison.compare import LISTED, Comparison
-from multiphi_exudyn.study.comparison.plots import first_contact_span, pictured, styles
+from multiphi_exudyn.study.comparison.compare import MOST_LISTED, Comparison
+from multiphi_exudyn.study.comparison.plots import first_contact_span, plotted_runs, styles
 from multiphi_exudyn.study.measures.metrics import union
 from multiphi_exudyn.study.running.runs import ModelRun
 
@@ -54,14 +54,14 @@ def _encoded(values: ArrayLike) -> str:
 
 
 def _plots(comparison: Comparison) -> Iterator[dict[str, Any]]:
-    runs, time = [comparison.reference, *pictured(comparison)], comparison.bench.time
+    runs, time = [comparison.reference, *plotted_runs(comparison)], comparison.bench.time
     x = {"label": "time [s]", "group": "time", "log": False, "start": time[0], "step": time[1] - time[0]}
     contacts = comparison.reference.contact_intervals
     shade, detail = union(contacts.values()).tolist(), list(first_contact_span(comparison))
     for point in comparison.bench.points:
         lines = [_line(comparison, run, 1e3 * run.points[point]) for run in runs]
         yield zoom_plot(f"{point} [mm]", x, lines, shade=shade, detail=detail)
-    for contact, intervals in contacts.items() if len(contacts) <= LISTED else ():
+    for contact, intervals in contacts.items() if len(contacts) <= MOST_LISTED else ():
         lines = [_line(comparison, run, run.contact_force[contact]) for run in runs]
         yield zoom_plot(f"force of {contact} [N]", x, lines, shade=intervals.tolist(), detail=detail)
 

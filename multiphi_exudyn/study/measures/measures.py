@@ -1,4 +1,4 @@
-"""All measures of one run, as JSON can hold them; what each one is stands in ``metrics.METRICS``."""
+"""All measures of one run as JSON values; ``metrics.METRICS`` defines them."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ DIFFERENCES: dict[str, Difference] = {
 
 
 def measures(bench: Workbench, run: ModelRun, reference: ModelRun | None) -> dict[str, Any]:
-    """Every measure of a run: differences to ``reference`` by window or tolerance, the others by point or contact.
+    """All measures of a run: differences to ``reference`` by window or tolerance, the others by point or contact.
 
-    A number that does not exist is None; a table without entries ({}) says that there was nothing to measure.
+    A number that does not exist is None; a table is {} where there is nothing to measure.
     """
     return {
         "label": run.label,
@@ -45,7 +45,7 @@ def measures(bench: Workbench, run: ModelRun, reference: ModelRun | None) -> dic
 def horizons(bench: Workbench, run: ModelRun, reference: ModelRun) -> dict[str, float]:
     """Tolerance -> agreement horizon [s] of the judged points.
 
-    Between the reference and its own copy it is ``pointwise_until``.
+    For the reference and its coarser copy this is ``pointwise_until``.
     """
     pairs = [(run.points[point], reference.points[point]) for point in bench.judged_points]
     tolerances = bench.scene.file.outputs.tolerances
@@ -67,13 +67,13 @@ def _differences(bench: Workbench, run: ModelRun, reference: ModelRun | None) ->
 
 
 def _contacts(bench: Workbench, run: ModelRun) -> dict[str, dict[str, Any]]:
-    given = run.contact_intervals
+    intervals = run.contact_intervals
     return {
-        "first_contact": {name: metrics.first_contact(times) for name, times in given.items()},
-        "contact_count": {name: len(times) for name, times in given.items()},
-        "closed_time": {name: metrics.closed_time(times) for name, times in given.items()},
-        "intervals": {name: times.tolist() for name, times in given.items()},
+        "first_contact": {name: metrics.first_contact(times) for name, times in intervals.items()},
+        "contact_count": {name: len(times) for name, times in intervals.items()},
+        "closed_time": {name: metrics.closed_time(times) for name, times in intervals.items()},
+        "intervals": {name: times.tolist() for name, times in intervals.items()},
         "largest_force": {name: metrics.number(np.max(force)) for name, force in run.contact_force.items()},
         "impulse": {name: metrics.number(value) for name, value in run.impulse.items()},
-        "inner_losses": {name: metrics.inner_losses(times, bench.longest_period) for name, times in given.items()},
+        "inner_losses": {name: metrics.inner_losses(times, bench.longest_period) for name, times in intervals.items()},
     }

@@ -1,4 +1,4 @@
-"""Measures of how two histories differ, each in one place with its label, unit and definition.
+"""Measures of the difference between two histories, with label, unit and definition.
 
 Histories are values at the times of one common grid, (k,); windows start at 0 and end at ``until``.
 """
@@ -19,8 +19,8 @@ __all__ = [
     "closed_time",
     "first_contact",
     "first_phase",
-    "held_levels",
     "inner_losses",
+    "level_durations",
     "max_difference",
     "nrmse",
     "number",
@@ -28,13 +28,13 @@ __all__ = [
     "union",
 ]
 
-STILL = 0.01  # of ||ref|| of the whole run: a point that has moved less is at rest, what it does there is round-off
+SMALLEST_NORM = 0.01  # of ||ref|| of the whole run: a smaller norm is round-off of a point at rest
 LEAVING = 0.25  # of the open level's longest period: an opening longer than this ends a contact phase
 
 
 @dataclass(frozen=True)
 class Metric:
-    """How a measure is written in tables and figures."""
+    """Label, unit and definition of a measure, for tables and figures."""
 
     label: str
     unit: str
@@ -53,10 +53,10 @@ METRICS = {
     "stiff_nrmse": Metric(
         "difference to stiff stops (NRMSE)",
         "1",
-        "the same, of models with rigid levels, to the linear structure with all modes on stops so stiff that more "
-        "stiffness changes little: the decade above the scene's own stops and above 1e5 times the structure's static "
-        "stiffness at a contact, and 10 and 100 times as much. The largest of the three counts. Their own uncertainty "
-        "is the largest difference between two of them.",
+        "the NRMSE of models with rigid levels to the linear structure with all modes on very stiff stops. Three stop "
+        "stiffnesses are used: the power of ten above the scene's own stops and above 1e5 times the structure's static "
+        "stiffness at a contact, and 10 and 100 times that value. The largest of the three differences counts. The "
+        "uncertainty of this reference is the largest difference between two of the three runs.",
     ),
     "max_difference": Metric(
         "largest difference",
@@ -67,39 +67,39 @@ METRICS = {
         "spectral difference",
         "1",
         "|| |Y| - |Yref| || / || |Yref| || of the Hann-windowed amplitude spectra of one point's displacements from 0 "
-        "to the window's end: a shift in phase counts nothing.",
+        "to the window's end. A shift in phase does not change it.",
     ),
     "horizon": Metric(
         "agreement horizon",
         "s",
         "the first time to which the NRMSE, taken from 0 to that time, of any judged point exceeds the "
-        "tolerance; the end of the run where that never happens. ||ref|| counts as a hundredth of that of the whole "
-        "run while it is less: a point that is still at rest says nothing.",
+        "tolerance; the end of the run where that never happens. ||ref|| is taken as at least a hundredth of that "
+        "of the whole run, so that round-off of a point still at rest does not count.",
     ),
     "horizon_s": Metric(
         "sensitivity horizon",
         "s",
-        "the first time at which a reduced run and the same one with its start nudged by 1e-12 differ by more than the "
-        "tolerance, relative to their displacements; the end of the run where that never happens. It takes no "
-        "reference. No processor, and no other code, agrees with a run much beyond it.",
+        "the first time at which a reduced run and the same run with its start changed by 1e-12 differ by more than "
+        "the tolerance, relative to their displacements; the end of the run where that never happens. It needs no "
+        "reference. Runs on other processors or by other codes may differ by as much after this time.",
     ),
     "warnings": Metric(
         "warnings",
         "text",
-        "what a reduced model says is to be distrusted in its own answer, and what to do about it, one sentence each; "
-        "it begins with its kind and a colon.",
+        "doubts of a reduced model about its own result, each with a remedy in one sentence, which begins with the "
+        "kind of warning and a colon.",
     ),
     "pointwise_until": Metric(
         "pointwise until",
         "s",
-        "the agreement horizon between the reference and its own coarser or minutely disturbed copy: from here on a "
-        "pointwise difference of the size of the tolerance says nothing about a model.",
+        "the agreement horizon between the reference and its coarser or slightly perturbed copy. After this time a "
+        "pointwise difference of the size of the tolerance is no error of a model.",
     ),
     "largest": Metric("largest displacement", "m", "largest |y| of one point over all samples of the run."),
     "largest_force": Metric(
         "largest contact force",
         "N",
-        "over all samples of the run; an impact has an impulse, no force.",
+        "largest force over all samples of the run; an impact has an impulse and no force.",
     ),
     "first_contact": Metric("first contact", "s", "start of the first contact interval after the release."),
     "intervals": Metric(
@@ -124,20 +124,20 @@ METRICS = {
     "ledger": Metric(
         "energy ledger",
         "J",
-        "where the initial energy went, row by row; the residual is what the rows leave unaccounted for.",
+        "balance of the initial energy and the work of loads, row by row; the residual is what no row accounts for.",
     ),
 }
 
 
 def number(value: float) -> float | None:
-    """As JSON has it: None where there is no finite number."""
+    """The value for JSON: None where it is not finite."""
     return float(value) if math.isfinite(value) else None
 
 
 def by_window(
     windows: Iterable[float], points: Iterable[str], measure: Callable[[str, float], float]
 ) -> dict[str, dict[str, float | None]]:
-    """End of the window [s] -> point -> measure(point, end)."""
+    """Values of ``measure(point, end)``: end of the window [s] -> point -> value."""
     return {f"{end:g}": {point: number(measure(point, end)) for point in points} for end in windows}
 
 
@@ -154,8 +154,11 @@ def max_difference(values: np.ndarray, reference: np.ndarray, time: np.ndarray, 
 
 
 def running_nrmse(values: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """The NRMSE from the first sample to each sample, (k,); see STILL; 0 where the reference is zero throughout."""
-    size = np.maximum(np.cumsum(reference**2), STILL**2 * np.sum(reference**2))
+    """NRMSE (k,) from the first sample to each sample; 0 for a zero reference.
+
+    ||ref|| is at least SMALLEST_NORM times that of the whole run.
+    """
+    size = np.maximum(np.cumsum(reference**2), SMALLEST_NORM**2 * np.sum(reference**2))
     difference = np.cumsum((values - reference) ** 2)
     return np.sqrt(np.divide(difference, size, out=np.zeros_like(size), where=size > 0))
 
@@ -173,7 +176,7 @@ def first_contact(intervals: np.ndarray) -> float | None:
 
 
 def first_phase(intervals: np.ndarray, longest_period: float) -> np.ndarray:
-    """The contact intervals, (m, 2), of the first contact phase; ``longest_period`` [s] is the open level's."""
+    """Contact intervals (m, 2) of the first contact phase; ``longest_period`` [s]: of the open level."""
     if not len(intervals):
         return intervals
     openings = intervals[1:, 0] - intervals[:-1, 1]
@@ -182,7 +185,7 @@ def first_phase(intervals: np.ndarray, longest_period: float) -> np.ndarray:
 
 
 def inner_losses(intervals: np.ndarray, longest_period: float) -> int:
-    """Losses of contact inside the first contact phase."""
+    """Number of losses of contact inside the first contact phase."""
     return max(0, len(first_phase(intervals, longest_period)) - 1)
 
 
@@ -202,15 +205,15 @@ def union(intervals: Iterable[np.ndarray]) -> np.ndarray:
     return np.reshape(joined, (-1, 2))
 
 
-def held_levels(intervals: Mapping[str, np.ndarray], t_end: float) -> dict[tuple[str, ...], float]:
-    """How long [s] each set of contacts is the closed one, from 0 to t_end; intervals: of each contact, (k, 2)."""
+def level_durations(intervals: Mapping[str, np.ndarray], t_end: float) -> dict[tuple[str, ...], float]:
+    """Time [s] from 0 to t_end in each set of closed contacts; intervals: (k, 2) of each contact."""
     edges = np.unique(
         np.clip(np.concatenate([[0.0, t_end], *(np.ravel(each) for each in intervals.values())]), 0, t_end)
     )
     middle = (edges[:-1] + edges[1:]) / 2
     inside = {name: np.any((each[:, :1] < middle) & (middle < each[:, 1:]), axis=0) for name, each in intervals.items()}
-    held: dict[tuple[str, ...], float] = {}
+    durations: dict[tuple[str, ...], float] = {}
     for i, length in enumerate(np.diff(edges)):
         closed = tuple(name for name, during in inside.items() if during[i])
-        held[closed] = held.get(closed, 0.0) + float(length)
-    return held
+        durations[closed] = durations.get(closed, 0.0) + float(length)
+    return durations

@@ -9,8 +9,8 @@ A, F the discrete Fourier transforms of responses and force. Near a mode, in a b
     H_p = (b_p0 + b_p1 s + b_p2 s^2) / (s - lambda),   s = 2 pi i (f - f_0)
 
 with one pole lambda for all responses; the polynomial holds the residue and what the other modes add. Multiplied by
-s - lambda the equations are linear in lambda and b (E. C. Levy, IRE Trans. Automatic Control 4, 1959). The band is
-found with the pole: it ends at half way to the next peak, or some widths of the peak away from it.
+s - lambda the equations are linear in lambda and b (E. C. Levy, IRE Trans. Automatic Control 4, 1959). The band
+follows from the pole by iteration: it ends half way to the next peak, or at WIDTHS half widths of the peak.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from multiphi_exudyn.errors import MultiPhiValueError
 __all__ = ["ResponseModes", "frequency_response_functions", "identified_modes"]
 
 PROMINENCE = 10.0  # dB by which a peak of all responses together stands out of its surroundings
-FIRST_BAND = 0.1  # of the peak's frequency at most, either side: wide beside the noise of single lines
-WIDTHS = 4.0  # half band in units of zeta f, the half width of the peak,
-FEWEST_LINES = 8  # either side of it, whatever its width
-ROUNDS = 4  # of a band from the pole's width and a pole from the band
+FIRST_BAND = 0.1  # half band at most, as a fraction of the peak's frequency
+WIDTHS = 4.0  # half band in units of zeta f, the half width of the peak
+FEWEST_LINES = 8  # spectral lines in a half band at least
+ROUNDS = 4  # iterations: the band follows from the pole, the pole from the band
 DEGREE = 2  # of b_p, in the last band
-SOFTEST = 0.2  # of the critical damping: what is softer than this is no resonance
+HIGHEST_RATIO = 0.2  # damping ratio above which a peak is no resonance
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,14 @@ def identified_modes(frequencies: np.ndarray, functions: np.ndarray, lowest: flo
     f, h = frequencies[band], functions[:, band]
     level = 10 * np.log10(np.sum(np.abs(h) ** 2, axis=0))
     peaks = scipy.signal.find_peaks(level, prominence=PROMINENCE)[0]
-    poles = [_pole(f, h, float(f[peak]), _alone(f[peaks], float(f[peak]))) for peak in peaks]
-    found = sorted((abs(pole) / (2 * math.pi), -pole.real / abs(pole)) for pole in poles)
-    kept = [(hz, ratio) for hz, ratio in found if lowest <= hz <= highest and 0 < ratio < SOFTEST]
+    poles = [_pole(f, h, float(f[peak]), _half_band(f[peaks], float(f[peak]))) for peak in peaks]
+    modes = sorted((abs(pole) / (2 * math.pi), -pole.real / abs(pole)) for pole in poles)
+    kept = [(hz, ratio) for hz, ratio in modes if lowest <= hz <= highest and 0 < ratio < HIGHEST_RATIO]
     return ResponseModes(np.array([hz for hz, _ in kept]), np.array([ratio for _, ratio in kept]))
 
 
-def _alone(peaks: np.ndarray, peak: float) -> float:
-    """Half band [Hz] around a peak that no other one lies in."""
+def _half_band(peaks: np.ndarray, peak: float) -> float:
+    """Half band [Hz] around a peak that ends half way to the next peak."""
     others = np.abs(peaks[peaks != peak] - peak)
     return float(np.min(others / 2, initial=FIRST_BAND * peak))
 
@@ -82,15 +82,15 @@ def _pole(f: np.ndarray, h: np.ndarray, peak: float, most: float) -> complex:
     half, centre, pole = max(most, fewest), peak, 0j
     for _ in range(ROUNDS):
         use = np.abs(f - centre) <= half
-        pole = 2j * math.pi * centre + 2 * math.pi * half * _fitted((f[use] - centre) / half, h[:, use])
+        pole = 2j * math.pi * centre + 2 * math.pi * half * _fitted_pole((f[use] - centre) / half, h[:, use])
         centre = pole.imag / (2 * math.pi)
         half = max(min(WIDTHS * abs(pole.real) / (2 * math.pi), most), fewest)
     return pole
 
 
-def _fitted(places: np.ndarray, h: np.ndarray) -> complex:
-    """The pole of H (points, k) at s = 1j times places (k,) in -1 ... 1."""
-    s = 1j * places
+def _fitted_pole(positions: np.ndarray, h: np.ndarray) -> complex:
+    """The pole of H (points, k) at s = 1j times positions (k,) in -1 ... 1."""
+    s = 1j * positions
     polynomials = np.kron(np.eye(len(h)), np.vander(s, DEGREE + 1))
     matrix = np.column_stack([h.ravel(), polynomials])
     return complex(np.linalg.lstsq(matrix, (h * s).ravel())[0][0])

@@ -1,7 +1,7 @@
-"""Spectra of histories: how much two differ in them, and how they change with time.
+"""Spectra of histories: the difference between two spectra, and the change of a spectrum with time.
 
-The spectral difference compares amplitude spectra |Y| of Hann-windowed histories, so that a shift in phase costs
-nothing. The map is the continuous wavelet transform with the complex Morlet wavelet
+The spectral difference compares amplitude spectra |Y| of Hann-windowed histories, so that a shift in phase has
+no effect. The map is the continuous wavelet transform with the complex Morlet wavelet
 
     psi(t) = (pi B)^(-1/2) exp(-t^2 / B) exp(2 pi i C t),   B = 3 (bandwidth), C = 1 (centre frequency),
 
@@ -26,7 +26,7 @@ __all__ = ["FEWEST", "FREQUENCIES", "Map", "spectral_difference", "wavelet_map"]
 FREQUENCIES = np.geomspace(2.0, 500.0, 160)  # Hz
 FREQUENCIES.flags.writeable = False
 BANDWIDTH, CENTRE = 3.0, 1.0  # B, C
-FEWEST = 4  # samples per period that the record itself must have
+FEWEST = 4  # samples per period of the record at least
 MOST_COLUMNS = 600  # of a map
 
 
@@ -40,7 +40,7 @@ class Map:
 
     @property
     def cone(self) -> np.ndarray:
-        """Cone of influence (f,) [s]: nearer than this to the record's ends its being cut off shows."""
+        """Cone of influence (f,) [s]: distance from the ends of the record within which these affect the map."""
         return math.sqrt(BANDWIDTH) * CENTRE / self.frequencies
 
 
@@ -49,9 +49,9 @@ def spectral_difference(values: np.ndarray, reference: np.ndarray, time: np.ndar
     count = np.count_nonzero(time <= until * (1 + 1e-9))
     window = np.hanning(count)
     spectra = np.stack([values[:count], reference[:count]]) * window
-    own, other = np.abs(scipy.fft.rfft(spectra, scipy.fft.next_fast_len(count, real=True)))
-    size = np.linalg.norm(other)
-    return float(np.linalg.norm(own - other) / size) if size > 0 else math.nan
+    spectrum, reference_spectrum = np.abs(scipy.fft.rfft(spectra, scipy.fft.next_fast_len(count, real=True)))
+    size = np.linalg.norm(reference_spectrum)
+    return float(np.linalg.norm(spectrum - reference_spectrum) / size) if size > 0 else math.nan
 
 
 def wavelet_map(values: np.ndarray, time: np.ndarray, frequencies: np.ndarray = FREQUENCIES) -> Map:
@@ -66,14 +66,14 @@ def wavelet_map(values: np.ndarray, time: np.ndarray, frequencies: np.ndarray = 
     amplitude = np.empty((len(frequencies), len(starts)))
     for row, frequency in enumerate(frequencies):
         wavelet = np.where(lines > 0, np.exp(-BANDWIDTH * (math.pi * CENTRE * (lines / frequency - 1)) ** 2), 0.0)
-        found = 2 * np.abs(scipy.fft.ifft(spectrum * wavelet))[: len(time)]
-        amplitude[row] = np.add.reduceat(found, starts) / counts
+        envelope = 2 * np.abs(scipy.fft.ifft(spectrum * wavelet))[: len(time)]
+        amplitude[row] = np.add.reduceat(envelope, starts) / counts
     return Map(np.add.reduceat(time, starts) / counts, frequencies, amplitude)
 
 
 def _check(frequencies: np.ndarray, step: float) -> None:
     highest = 1 / (FEWEST * step)
-    wrong = frequencies[~((frequencies > 0) & (frequencies <= highest * (1 + 1e-9)))]
-    if len(wrong):
+    invalid = frequencies[~((frequencies > 0) & (frequencies <= highest * (1 + 1e-9)))]
+    if len(invalid):
         need = f"need above 0 and at most {highest:g} Hz ({FEWEST} samples per period)"
-        raise MultiPhiValueError(f"frequencies: got {wrong[0]:g} Hz, {need}")
+        raise MultiPhiValueError(f"frequencies: got {invalid[0]:g} Hz, {need}")

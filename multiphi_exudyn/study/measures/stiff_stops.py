@@ -1,15 +1,15 @@
-"""Stiff stops: what rigid levels are measured against beside the scene's own stop.
+"""Stiff stops: a second reference for models with rigid levels.
 
-With the stiffness k of a stop answers converge, about as k^-1/2, and to those of rigid levels. From a soft stop rigid
-levels differ by its softness, which no number of modes removes; what is their own error shows against a stiff one. That
-reference has the same linear structure with all modes, and stops of k, 10 k and 100 k. k is the power of ten above the
-scene's own stops and above STIFF times the structure's static stiffness at any contact,
+For large stop stiffness k results converge, about as k^-1/2, to those of rigid levels. From a soft stop rigid levels
+differ by its compliance, whatever the number of modes; their own error shows against a stiff stop. The second
+reference is the same linear structure with all modes and stops of k, 10 k and 100 k, where k is the power of ten above
+the scene's own stops and above STIFF times the structure's static stiffness at any contact,
 
     1 / sum (a / omega)^2,  a = Phi^T h, over the elastic modes of the open level.                              [N/m]
 
-Of the differences to the three the largest counts: with so many contacts a single one can be lucky. Their own
-uncertainty is the largest difference between two of them: what stiffness still changes, and what the answer is
-sensitive to anyway. Large displacements are not in it.
+The largest of the three differences counts, since with many contacts a single one may be small by chance. The
+uncertainty is the largest difference between two of the three runs: effect of the stiffness, and sensitivity of the
+motion. Geometric nonlinearity is not included.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
 __all__ = ["StiffStops", "rigid_models", "stiff_stops"]
 
-STIFF = 1e5  # static stiffnesses: from there on more changes the rig's answers by no more than a nudged start
+STIFF = 1e5  # static stiffnesses: above, more stiffness changes the rig's motion as little as a perturbed start
 FACTORS = (1.0, 10.0, 100.0)  # of the softest of the stiff stops
 
 Histories = Mapping[str, np.ndarray]  # point -> displacements (k,) [m] on the common grid
@@ -40,7 +40,11 @@ Histories = Mapping[str, np.ndarray]  # point -> displacements (k,) [m] on the c
 
 @dataclass(frozen=True)
 class StiffStops:
-    """stiffness: of the stops [N/m], ascending. histories: the answer with each; none if one failed: ``message``."""
+    """Runs with stiff stops.
+
+    stiffness: of the stops [N/m], ascending. histories: one entry for each; empty if a run failed for the cause
+    ``message``.
+    """
 
     stiffness: tuple[float, ...]
     histories: tuple[Histories, ...]
@@ -48,22 +52,22 @@ class StiffStops:
 
     @property
     def ok(self) -> bool:
-        """Whether there is something to measure against."""
+        """Whether all runs reached their end."""
         return not self.message
 
     def error(self, run: ModelRun, points: Sequence[str], until: float) -> float:
-        """Largest NRMSE of the points from 0 to ``until`` [s], against any of the stops."""
-        return max(_apart(run.points, stiff, points, run.time, until) for stiff in self.histories)
+        """Largest NRMSE of the points from 0 to ``until`` [s] to the runs with stiff stops."""
+        return max(_largest_nrmse(run.points, stiff, points, run.time, until) for stiff in self.histories)
 
     def uncertainty(self, time: np.ndarray, points: Sequence[str], until: float) -> float:
-        """The same of every stop against the stiffer ones."""
+        """Largest NRMSE of the points between two runs with stiff stops, from 0 to ``until`` [s]."""
         pairs = itertools.combinations(self.histories, 2)
-        return max(_apart(softer, stiffer, points, time, until) for softer, stiffer in pairs)
+        return max(_largest_nrmse(softer, stiffer, points, time, until) for softer, stiffer in pairs)
 
     def values(self, bench: Workbench, runs: Mapping[str, ModelRun]) -> dict[str, Any]:
-        """What JSON holds of it: by window and point its uncertainty, and the errors of ``runs`` by name."""
+        """JSON values: uncertainty by window and point, and the errors of ``runs`` by name."""
 
-        def own(point: str, until: float) -> float:
+        def uncertainty(point: str, until: float) -> float:
             return self.uncertainty(bench.time, (point,), until)
 
         def errors(run: ModelRun) -> dict[str, dict[str, float | None]]:
@@ -72,25 +76,25 @@ class StiffStops:
         return {
             "stiffness": list(self.stiffness),
             "message": self.message,
-            "uncertainty": metrics.by_window(bench.windows, bench.points, own) if self.ok else {},
+            "uncertainty": metrics.by_window(bench.windows, bench.points, uncertainty) if self.ok else {},
             "errors": {name: errors(run) for name, run in runs.items() if self.ok and run.ok},
         }
 
 
 def rigid_models(bench: Workbench) -> tuple[str, ...]:
-    """Names of the scene's models that take every contact as rigid; none where printed frequencies are a level's."""
+    """Names of the models in which every contact is rigid; empty where levels have printed frequencies."""
     if bench.overrides or not bench.mechanics.contacts:
         return ()
-    given = all(contact.rigid for contact in bench.mechanics.contacts)
+    all_rigid = all(contact.rigid for contact in bench.mechanics.contacts)
     models = bench.scene.models
-    return tuple(name for name in models if given or models[name].rigid)
+    return tuple(name for name in models if all_rigid or models[name].rigid)
 
 
 def stiff_stops(bench: Workbench) -> StiffStops | None:
     """Run the linear structure against stiff stops; None where no model of the scene has rigid levels."""
     if not rigid_models(bench):
         return None
-    softest = 10.0 ** math.ceil(math.log10(_softest(bench)))
+    softest = 10.0 ** math.ceil(math.log10(_least_stiffness(bench)))
     stiffness = tuple(factor * softest for factor in FACTORS)
     try:
         return StiffStops(stiffness, tuple(_histories(bench, each) for each in stiffness))
@@ -98,21 +102,23 @@ def stiff_stops(bench: Workbench) -> StiffStops | None:
         return StiffStops(stiffness, (), str(error))
 
 
-def _apart(values: Histories, reference: Histories, points: Sequence[str], time: np.ndarray, until: float) -> float:
+def _largest_nrmse(
+    values: Histories, reference: Histories, points: Sequence[str], time: np.ndarray, until: float
+) -> float:
     return max(metrics.nrmse(values[point], reference[point], time, until) for point in points)
 
 
-def _softest(bench: Workbench) -> float:
-    """What the softest of the stops has at least [N/m]; a structure without any stiffness gives no scale."""
+def _least_stiffness(bench: Workbench) -> float:
+    """Lower bound of the stiffness of the stops [N/m]; 1 for a structure without stiffness."""
     level = MultiPhiModel(bench.structure, bench.contacts(rigid=True), modes="all").level(())
     elastic = level.squares > 0
     flexibilities = level.gap_rows[:, elastic] ** 2 @ (1 / level.squares[elastic])
-    own = [contact.stiffness for contact in bench.mechanics.contacts if not contact.rigid]
-    return float(max([*own, *(STIFF / flexibilities[flexibilities > 0])], default=1.0))
+    stiffnesses = [contact.stiffness for contact in bench.mechanics.contacts if not contact.rigid]
+    return float(max([*stiffnesses, *(STIFF / flexibilities[flexibilities > 0])], default=1.0))
 
 
 def _histories(bench: Workbench, stiffness: float) -> Histories:
-    """All modes of the bench's structure, every stop of one stiffness."""
+    """Displacements of the structure with all modes and this stiffness [N/m] of every stop."""
     contacts = [replace(contact, stiffness=stiffness) for contact in bench.contacts(rigid=True)]
     model = MultiPhiModel(bench.structure, [*contacts, *bench.mechanics.force_laws], modes="all")
     with kept_back():

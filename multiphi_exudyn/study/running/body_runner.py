@@ -1,4 +1,4 @@
-"""Runs a Multi-Phi model as a body inside Exudyn."""
+"""Run a Multi-Phi model as a body inside Exudyn."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from multiphi_exudyn.exudyn_plugin import BodyHistories
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.study.running.runner import Runner
-from multiphi_exudyn.study.running.runs import interval_array, way
+from multiphi_exudyn.study.running.runs import interval_array, path_length
 from reference_models.body_alone import solve_body_alone
 
 __all__ = ["BodyRunner"]
@@ -21,16 +21,16 @@ Prepared = tuple[MultiPhiModel, Equilibrium]
 
 
 class BodyRunner(Runner):
-    """The body in an empty system, its modes matched to the step."""
+    """Run the body alone in a system, its modes matched to the step."""
 
     @property
     def label(self) -> str:
-        levels = f"{self.level_words()}, r = {self.spec.modes}{self.printed_words()}"
+        levels = f"{self.level_text()}, r = {self.spec.modes}{self.printed_text()}"
         return f"Exudyn user object, {levels}, step {self.spec.step * 1e6:g} µs"
 
     @property
     def steps(self) -> int:
-        """How many there are."""
+        """Number of time steps of the run."""
         return int(np.ceil(self.bench.t_end / self.spec.step * (1 - 1e-9)))
 
     def solve(self, prepared: Prepared) -> tuple[BodyHistories, float]:
@@ -57,23 +57,23 @@ class BodyRunner(Runner):
             "ledger": self._ledger(answer),
         }
 
-    def _interpolated(self, answer: BodyHistories, given: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        return {name: np.interp(self.bench.time, answer.time, values) for name, values in given.items()}
+    def _interpolated(self, answer: BodyHistories, histories: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        return {name: np.interp(self.bench.time, answer.time, values) for name, values in histories.items()}
 
     def _ledger(self, answer: BodyHistories) -> dict[str, float]:
-        """What left at events, and what friction has taken on its ways, which turn between samples at the earliest."""
+        """Energy lost at events, and dissipated by friction along the sampled slip [J]."""
         rows = ["impact", "truncation_kinetic", "truncation_strain", *(["friction"] if answer.slip else [])]
-        lost = {row: float(sum(getattr(event.loss, row) for event in answer.events)) for row in rows}
+        losses = {row: float(sum(getattr(event.loss, row) for event in answer.events)) for row in rows}
         for friction in self.bench.mechanics.frictions:
-            lost["friction"] += friction.limit * way(answer.slip[friction.name])
+            losses["friction"] += friction.limit * path_length(answer.slip[friction.name])
         for contact in self.bench.mechanics.contacts:
             if contact.friction:
                 force, slip = answer.friction_force[contact.name], answer.slip[contact.name]
-                lost["friction"] += float(np.trapezoid(force, slip))
-        return lost
+                losses["friction"] += float(np.trapezoid(force, slip))
+        return losses
 
 
 def _impulse(answer: BodyHistories, contact: str) -> float:
-    """Of the recorded force by the trapezoidal rule, and of the impacts [N s]."""
-    struck = sum(event.impulse for event in answer.events if event.contact == contact)
-    return float(np.trapezoid(answer.contact_force[contact], answer.time) + struck)
+    """Impulse [N s] of the recorded force, by the trapezoidal rule, and of the impacts."""
+    impacts = sum(event.impulse for event in answer.events if event.contact == contact)
+    return float(np.trapezoid(answer.contact_force[contact], answer.time) + impacts)

@@ -1,4 +1,4 @@
-"""Runs a Craig-Bampton component with contact elements inside Exudyn.
+"""Run a Craig-Bampton component with contact elements inside Exudyn.
 
 The start is that of the linear model, projected on the component: exact where the load acts on an interface point.
 """
@@ -27,12 +27,12 @@ from reference_models.point_contact import PointContact
 
 __all__ = ["CraigBamptonRunner"]
 
-FINER = 10  # samples of a gap for each recorded one, between which its crossings are interpolated
+GAP_SAMPLES = 10  # samples of a gap per recorded sample, for the interpolation of its zeros
 
 
 @dataclass(frozen=True)
 class Component:
-    """Component, contacts, start q (b + m,), and the strain energy [J] that projecting the start has dropped."""
+    """Component, contacts, start q (b + m,), and the strain energy [J] lost by projecting the start (dropped)."""
 
     component: CraigBampton
     contacts: tuple[PointContact, ...]
@@ -41,8 +41,9 @@ class Component:
 
     def energy(self, recorded: CraigBamptonRun) -> np.ndarray:
         """Kinetic + strain energy (s,) [J], the contact springs included."""
-        q, v, own = recorded.coordinates, recorded.velocities, self.component
-        energy = 0.5 * np.einsum("ti,ti->t", v @ own.mass, v) + 0.5 * np.einsum("ti,ti->t", q @ own.stiffness, q)
+        q, v = recorded.coordinates, recorded.velocities
+        mass, stiffness = self.component.mass, self.component.stiffness
+        energy = 0.5 * np.einsum("ti,ti->t", v @ mass, v) + 0.5 * np.einsum("ti,ti->t", q @ stiffness, q)
         for contact in self.contacts:
             energy += contact.energy(self.gap(contact, q))
         return energy
@@ -53,14 +54,14 @@ class Component:
 
 
 class CraigBamptonRunner(Runner):
-    """Reduce, solve, sample; a run that gains energy has failed, as a full one has."""
+    """Run the component; as for a full beam, a gain of energy is a failure."""
 
-    in_steps = True
+    may_gain_energy = True
 
     @property
     def label(self) -> str:
-        given, interface = self.bench.scene.file.start, self.bench.interface
-        start = "" if given is None or given.load_at in interface else ", start projected"
+        load, interface = self.bench.scene.file.start, self.bench.interface
+        start = "" if load is None or load.load_at in interface else ", start projected"
         reduced = f"{len(interface)} interface points + {self.spec.modes} modes"
         return f"Craig-Bampton in Exudyn, {reduced}, step {self.spec.step * 1e6:g} µs{start}"
 
@@ -69,9 +70,9 @@ class CraigBamptonRunner(Runner):
         component = craig_bampton(structure, self.bench.interface, self.spec.modes)
         x = start_configuration(self.bench, MultiPhiModel(structure, contacts))
         start = component.coordinates(x)
-        left = x - component.shapes @ start
+        remainder = x - component.shapes @ start
         return Component(
-            component, interface_contacts(contacts), start, 0.5 * float(left @ (structure.stiffness @ left))
+            component, interface_contacts(contacts), start, 0.5 * float(remainder @ (structure.stiffness @ remainder))
         )
 
     def solve(self, prepared: Component) -> tuple[CraigBamptonRun, float]:
@@ -89,7 +90,7 @@ class CraigBamptonRunner(Runner):
         structure, shapes = self.bench.structure, prepared.component.shapes
         motion = CubicHermiteSpline(answer.time, answer.coordinates, answer.velocities)
         on_grid = motion(self.bench.time)
-        fine = np.linspace(0.0, self.bench.t_end, FINER * (len(answer.time) - 1) + 1)
+        fine = np.linspace(0.0, self.bench.t_end, GAP_SAMPLES * (len(answer.time) - 1) + 1)
         fields: dict[str, Any] = {
             "points": {name: on_grid @ (structure.row(name) @ shapes) for name in self.bench.points},
             "energy_time": answer.time,

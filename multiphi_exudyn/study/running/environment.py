@@ -1,4 +1,4 @@
-"""Where something ran: versions, machine, and what importing the packages costs."""
+"""Machine, versions, and import times of the packages."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def environment() -> dict[str, Any]:
 
 
 def import_times() -> dict[str, float | None]:
-    """The time [s] that each package's public names take to load in a fresh interpreter; None where it fails."""
+    """Import time [s] of each package with all its public names in a new interpreter; None for a failure."""
     return {name: _import_time(name) for name in IMPORTED}
 
 
@@ -50,7 +50,7 @@ def _version(package: str) -> str:
 
 
 def _processor() -> str:
-    """The processor's name where the system tells it."""
+    """Name of the processor, or "unknown"."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -59,11 +59,11 @@ def _processor() -> str:
 
 
 def _import_time(module: str) -> float | None:
-    """Seconds until all public names of a module are there; some are loaded when they are asked for."""
+    """Time [s] to import all public names of a module, some of which are loaded lazily."""
     code = f"import time; t = time.perf_counter(); from {module} import *; print(time.perf_counter() - t)"
     path = os.pathsep.join(filter(None, sys.path))
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-c", code],
             capture_output=True,
             text=True,
@@ -71,6 +71,6 @@ def _import_time(module: str) -> float | None:
             check=True,
             env=os.environ | {"PYTHONPATH": path},
         )
-        return float(done.stdout.split()[-1])
+        return float(process.stdout.split()[-1])
     except (subprocess.SubprocessError, ValueError, IndexError, OSError):
         return None

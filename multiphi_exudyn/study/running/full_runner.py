@@ -1,4 +1,4 @@
-"""Runs the full nonlinear beam."""
+"""Run the full nonlinear beam."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from reference_models.gentler import Attempt, attempts
 
 __all__ = ["FullRunner"]
 
-STILL = 1e-6  # of the range of its way: a patch that moves less from sample to sample sticks
+STICK_DISTANCE = 1e-6  # of the range of its slip: a patch that moves less between two samples sticks
 
 
 class FullRunner(Runner):
     """A full beam with the scene's damping on its own mesh; histories come on the common grid.
 
-    A run that fails, where it may be tried again, is so at gentler settings (reference_models/gentler.py); its message
-    then says at which, its time is that of all attempts.
+    With ``retry`` a failed run is repeated with other settings (reference_models/gentler.py); the message then says
+    with which, and the time is that of all attempts.
     """
 
     @property
@@ -41,13 +41,13 @@ class FullRunner(Runner):
         return beam, {"damping": damping, "loads": self.bench.loads_on(beam), **self._start()}
 
     def solve(self, prepared: tuple[FullBeam, dict[str, Any]]) -> tuple[list[Attempt], float]:
-        beam, given = prepared
+        beam, options = prepared
 
         def run(beam: FullBeam) -> FullRun:
-            return beam.run(self.bench.t_end, progress=self.progress, **given)
+            return beam.run(self.bench.t_end, progress=self.progress, **options)
 
-        tried = attempts(beam, run) if self.retry else [Attempt("as asked", run(beam))]
-        return tried, sum(attempt.run.online_s for attempt in tried)
+        runs = attempts(beam, run) if self.retry else [Attempt("as asked", run(beam))]
+        return runs, sum(attempt.run.online_s for attempt in runs)
 
     def repeats(self, answer: list[Attempt]) -> int:
         return self.bench.repeats if len(answer) == 1 else 0
@@ -70,11 +70,11 @@ class FullRunner(Runner):
             "points": {name: result.points[name] for name in self.bench.points},
             "gaps": result.gaps,
             "contact_force": forces,
-            "contact_intervals": {name: interval_array(given) for name, given in result.contact_intervals.items()},
+            "contact_intervals": {name: interval_array(pairs) for name, pairs in result.contact_intervals.items()},
             "impulse": {name: float(np.trapezoid(force, result.time)) for name, force in forces.items()},
             "friction_force": result.friction_force,
             "slip": result.slip,
-            "stick_intervals": {name: _sticking(result.time, slip) for name, slip in result.slip.items()},
+            "stick_intervals": {name: _stick_intervals(result.time, slip) for name, slip in result.slip.items()},
             "energy_time": result.energy_time,
             "energy": result.energy,
             "ledger": {
@@ -86,33 +86,33 @@ class FullRunner(Runner):
                 "residual": balance.initial + balance.work - balance.dissipated - balance.friction - balance.final,
                 "worst_gain": balance.worst_gain * balance.scale,
             },
-            "sampling_s": 0.0,  # it is recorded on the grid
+            "sampling_s": 0.0,  # recorded on the grid
         }
 
     def _start(self) -> dict[str, Any]:
-        """Where its static load acts and what it has to reach; nothing for a start at rest."""
+        """Options of the static start load: point and displacement; empty for a start at rest."""
         bench, start = self.bench, self.bench.scene.file.start
         if start is None:
             return {}
         if isinstance(start, DisplacedStart):
             return start.model_dump()
         model = MultiPhiModel(bench.structure, bench.nonlinearities(rigid=False))
-        reached = float(bench.structure.row(start.load_at) @ start_configuration(bench, model))
-        return {"load_at": start.load_at, "measured_at": start.load_at, "displacement": reached}
+        displacement = float(bench.structure.row(start.load_at) @ start_configuration(bench, model))
+        return {"load_at": start.load_at, "measured_at": start.load_at, "displacement": displacement}
 
 
-def _message(tried: Sequence[Attempt]) -> str:
-    """Of one attempt its own; of more, what was tried, and what made it run."""
-    last = tried[-1]
-    if len(tried) == 1:
+def _message(runs: Sequence[Attempt]) -> str:
+    """Message of a single attempt; of several, what was tried and with which settings the run succeeded."""
+    last = runs[-1]
+    if len(runs) == 1:
         return last.run.message
     if last.run.status == "ok":
-        return f"ran with gentler settings ({last.settings}); {'; '.join(attempt.told for attempt in tried[:-1])}"
-    return f"failed with every setting; {'; '.join(attempt.told for attempt in tried)}"
+        return f"ran with gentler settings ({last.settings}); {'; '.join(attempt.told for attempt in runs[:-1])}"
+    return f"failed with every setting; {'; '.join(attempt.told for attempt in runs)}"
 
 
-def _sticking(time: np.ndarray, slip: np.ndarray) -> np.ndarray:
-    """When (m, 2) [s] a patch, whose way (k,) is known on a grid, stays where it is."""
-    still = np.abs(np.diff(slip)) <= STILL * np.ptp(slip)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+def _stick_intervals(time: np.ndarray, slip: np.ndarray) -> np.ndarray:
+    """Intervals (m, 2) [s] in which a patch with slip (k,) on a time grid sticks."""
+    sticks = np.abs(np.diff(slip)) <= STICK_DISTANCE * np.ptp(slip)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], sticks, [False]]).astype(int)))
     return np.asarray(time[edges].reshape(-1, 2))

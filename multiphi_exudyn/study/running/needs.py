@@ -1,7 +1,7 @@
-"""Needs: what a scene's reduced run takes of what it could take.
+"""Needs: resources that the reduced run of a scene uses.
 
-Levels built of levels possible, coordinates carried of those given, packages imported, memory. A process of its own
-makes the run from M, C, K and the contacts, so nothing that this process has already loaded is counted.
+Levels built of levels possible, modal coordinates of DoFs, packages imported, memory. The run starts from M, C, K and
+the contacts in a new process, so that what this process has loaded does not count.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ HEADS = ("scene", "model", "levels built", "coordinates", "peak memory", "module
 
 @dataclass(frozen=True)
 class Needs:
-    """What the reduced run of a scene took.
+    """Resources used by the reduced run of a scene.
 
     levels_built of levels_possible; dofs_carried: coordinates of the largest level visited, those of varying loads
     among them, of dofs_given. modules: of this package, packages: others beside the standard library, that the run
-    imported. memory: its peak [bytes], M and K themselves not counted. warnings: what to distrust in its answer.
+    imported. memory: its peak [bytes], M and K themselves not counted. warnings: those of the run.
     """
 
     scene: str
@@ -52,40 +52,40 @@ class Needs:
 
 
 def needs_of(scene: Scene) -> Needs:
-    """Run the first reduced model of a scene in a process of its own."""
+    """Run the first reduced model of a scene in a new process, and return what it used."""
     spec = next((s for s in scene.models.values() if isinstance(s, ReducedModel) and s.tolerance is None), None)
     if spec is None:
         raise MultiPhiValueError(f"{scene.path}: models: got none of kind 'reduced' with a number of modes, need one")
     bench = prepare(scene, mechanics_of(scene))
-    model, given = bench.model(spec), bench.structure
-    of_model = {
-        "structure": LinearStructure(given.mass, given.stiffness, given.damping, given.points),
+    model, structure = bench.model(spec), bench.structure
+    model_arguments = {
+        "structure": LinearStructure(structure.mass, structure.stiffness, structure.damping, structure.points),
         "contacts": bench.nonlinearities(spec.rigid),
         "modes": model.modes,
         "overrides": bench.overrides,
     }
-    of_run = {"t_end": bench.t_end, "displacement": start_configuration(bench, model), "loads": bench.loads}
-    told = json.loads(_in_a_process(pickle.dumps((of_model, of_run))))
-    tuples = {name: tuple(told[name]) for name in ("packages", "warnings")}
-    return Needs(scene=scene.name, model=spec.name, **told | tuples)
+    run_arguments = {"t_end": bench.t_end, "displacement": start_configuration(bench, model), "loads": bench.loads}
+    values = json.loads(_run_in_process(pickle.dumps((model_arguments, run_arguments))))
+    tuples = {name: tuple(values[name]) for name in ("packages", "warnings")}
+    return Needs(scene=scene.name, model=spec.name, **values | tuples)
 
 
-def needs_table(found: Sequence[Needs]) -> str:
-    """A line for every scene."""
-    rows = [HEADS, *(_cells(needs) for needs in found)]
+def needs_table(needs_of_scenes: Sequence[Needs]) -> str:
+    """Text table with a line for each scene."""
+    rows = [HEADS, *(_cells(needs) for needs in needs_of_scenes)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(HEADS))]
     return "\n".join("  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows)
 
 
-def _in_a_process(task: bytes) -> str:
+def _run_in_process(task: bytes) -> str:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "task"
         file.write_bytes(task)
         command = [sys.executable, "-m", RUN_ALONE, str(file)]
-        done = subprocess.run(command, capture_output=True, text=True, env=os.environ, check=False)
-    if done.returncode:
-        raise NumericalFailure(f"the run in a process of its own ended with {done.stderr.strip().splitlines()[-1]}")
-    return done.stdout
+        process = subprocess.run(command, capture_output=True, text=True, env=os.environ, check=False)
+    if process.returncode:
+        raise NumericalFailure(f"the run in a process of its own ended with {process.stderr.strip().splitlines()[-1]}")
+    return process.stdout
 
 
 def _cells(needs: Needs) -> tuple[str, ...]:

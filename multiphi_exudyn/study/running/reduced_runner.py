@@ -1,7 +1,7 @@
-"""Runs a Multi-Phi model by itself, or one basis for all of its levels.
+"""Run a Multi-Phi model by itself, or a model with one basis for all levels.
 
-A level is built when it is first visited, so the first run is longer than its repeats; both are kept. Steps are events,
-of which there are as many as the motion has.
+A level is built when it is first visited, so the first run takes longer than its repeats; both times are kept. The
+number of steps is the number of events.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import numpy as np
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mechanics.structure import LinearStructure
-from multiphi_exudyn.study.running.runner import ENERGY_INTERVAL, Runner, modes_words
+from multiphi_exudyn.study.running.runner import ENERGY_INTERVAL, Runner, modes_text
 from multiphi_exudyn.study.running.runs import interval_array
 from multiphi_exudyn.study.running.timing import timed
-from multiphi_exudyn.study.scene.workbench import start_of
+from multiphi_exudyn.study.scene.workbench import start_equilibrium
 from multiphi_exudyn.time.reliability.truncation import truncation_indicator
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
@@ -26,21 +26,21 @@ from reference_models.pod_basis import pod_basis
 
 __all__ = ["GlobalBasisRunner", "ReducedRunner", "TrainedBasisRunner"]
 
-APART = 0.01  # of the motion, by which a run and a nudged one differ at the end of its horizon: what a reader sees
+HORIZON_TOLERANCE = 0.01  # of the motion: difference to a perturbed run that is visible in a plot
 
 Prepared = tuple[MultiPhiModel, Equilibrium]
 
 
 class ReducedRunner(Runner):
-    """The model of a scene's entry from the scene's start."""
+    """Run the Multi-Phi model of an entry of the scene."""
 
     compiled = True
 
     @property
     def label(self) -> str:
-        given = self.spec
-        chosen = f"modes for a truncation error of {given.tolerance:g}" if given.tolerance else modes_words(given.modes)
-        return f"Multi-Phi, {self.level_words()}, {chosen}{self.printed_words()}"
+        spec = self.spec
+        modes = f"modes for a truncation error of {spec.tolerance:g}" if spec.tolerance else modes_text(spec.modes)
+        return f"Multi-Phi, {self.level_text()}, {modes}{self.printed_text()}"
 
     def solve(self, prepared: Prepared) -> tuple[Trajectory, float]:
         model, start = prepared
@@ -57,9 +57,9 @@ class ReducedRunner(Runner):
 
     def histories(self, prepared: Prepared, answer: Trajectory) -> dict[str, Any]:
         time, t_end = self.bench.time, self.bench.t_end
-        contacts, frictions = [c.name for c in self.bench.mechanics.contacts], self.bench.mechanics.rubbing
-        points, of_points = timed(lambda: {name: answer.at(name, time) for name in self.bench.points})
-        gaps, of_gaps = timed(lambda: {name: answer.gap(name, time) for name in contacts})
+        contacts, frictions = [c.name for c in self.bench.mechanics.contacts], self.bench.mechanics.friction_names
+        points, points_s = timed(lambda: {name: answer.at(name, time) for name in self.bench.points})
+        gaps, gaps_s = timed(lambda: {name: answer.gap(name, time) for name in contacts})
         energy_time = np.linspace(0.0, t_end, round(t_end / ENERGY_INTERVAL) + 1)
         return {
             "points": points,
@@ -73,47 +73,49 @@ class ReducedRunner(Runner):
             "energy_time": energy_time,
             "energy": answer.energy(energy_time),
             "ledger": asdict(answer.ledger) | {"residual": answer.ledger.residual},
-            "sampling_s": of_points + of_gaps,
+            "sampling_s": points_s + gaps_s,
             "indicators": self.indicators(answer),
-            "horizon_s": {f"{APART:g}": answer.horizon(APART)} if self.horizon else {},
+            "horizon_s": {f"{HORIZON_TOLERANCE:g}": answer.horizon(HORIZON_TOLERANCE)} if self.horizon else {},
         }
 
     def indicators(self, answer: Trajectory) -> dict[str, float]:
-        """Its own estimates of its truncation error."""
+        """The model's estimates of its truncation error: end of the window [s] -> estimate."""
         return {f"{until:g}": truncation_indicator(answer, until) for until in self.bench.windows}
 
 
 class GlobalBasisRunner(ReducedRunner):
-    """The structure projected on one basis, from its own static equilibrium; with all its modes exact in time."""
+    """Run the structure projected on one basis, from its static equilibrium, with all modes of the basis."""
 
     @property
     def label(self) -> str:
-        return f"global basis, {self.level_words()}, r = {self.spec.modes} from each of two"
+        return f"global basis, {self.level_text()}, r = {self.spec.modes} from each of two"
 
     def prepare(self) -> Prepared:
         projected = self.projected()
         model = MultiPhiModel(projected, self.bench.nonlinearities(self.spec.rigid), modes="all")
-        return model, start_of(replace(self.bench, structure=projected), model)
+        return model, start_equilibrium(replace(self.bench, structure=projected), model)
 
     def projected(self) -> LinearStructure:
-        """The structure on its basis."""
+        """The structure projected on the basis."""
         return global_basis(self.bench.structure, self.bench.contacts(self.spec.rigid), self.spec.modes)
 
     def indicators(self, answer: Trajectory) -> dict[str, float]:
-        """None: the basis is not of levels."""
+        """Empty: the estimate needs modes of levels."""
         return {}
 
 
 class TrainedBasisRunner(GlobalBasisRunner):
-    """The structure on a basis of snapshots; the training run is part of what is done offline."""
+    """Run the structure on a basis of snapshots; the training run belongs to the offline time."""
 
     @property
     def label(self) -> str:
-        return f"POD basis of {self.spec.training:g} s, {self.level_words()}, r = {self.spec.modes}"
+        return f"POD basis of {self.spec.training:g} s, {self.level_text()}, r = {self.spec.modes}"
 
     def projected(self) -> LinearStructure:
-        """The structure on its basis."""
+        """The structure projected on the basis."""
         bench = self.bench
-        whole = MultiPhiModel(bench.structure, bench.nonlinearities(self.spec.rigid), modes="all")
+        complete = MultiPhiModel(bench.structure, bench.nonlinearities(self.spec.rigid), modes="all")
         until = min(self.spec.training, bench.t_end)
-        return pod_basis(simulate(whole, until, start=start_of(bench, whole), loads=bench.loads), self.spec.modes)
+        return pod_basis(
+            simulate(complete, until, start=start_equilibrium(bench, complete), loads=bench.loads), self.spec.modes
+        )

@@ -1,7 +1,7 @@
-"""One reduced run in a process of its own, which tells what it took: ``python -m ...run_alone FILE``.
+"""One reduced run in a process of its own, which prints what it used: ``python -m ...run_alone FILE``.
 
 FILE holds a pickled task: the arguments of MultiPhiModel and those of simulate. Nothing but the reduced model is
-imported here, so that the modules and the memory told are those that a run needs.
+imported here, so that the printed modules and memory are those that a run needs.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
 __all__ = ["run_alone"]
 
-OURS = "multiphi_exudyn"
+PACKAGE = "multiphi_exudyn"
 
 
-def run_alone(of_model: dict[str, Any], of_run: dict[str, Any]) -> dict[str, Any]:
-    """What the run took, as ``needs.Needs`` names it; memory counted from before its model is made."""
+def run_alone(model_arguments: dict[str, Any], run_arguments: dict[str, Any]) -> dict[str, Any]:
+    """Resources used by the run, with the names of ``needs.Needs``; memory includes that of the model."""
     tracemalloc.start()
-    model = MultiPhiModel(**of_model)
+    model = MultiPhiModel(**model_arguments)
     with kept_back():
-        run = simulate(model, **of_run)
+        run = simulate(model, **run_arguments)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     imported = [name.partition(".")[0] for name in sys.modules]
-    others = {name for name in packages_distributions() if not name.startswith("_")} - {OURS}
+    others = {name for name in packages_distributions() if not name.startswith("_")} - {PACKAGE}
     return {
         "status": run.status,
         "levels_built": run.stats.levels_built,
         "levels_possible": run.stats.levels_possible,
         "dofs_carried": max(segment.level.level.modes for segment in run.segments) if run.segments else 0,
         "dofs_given": model.structure.n,
-        "modules": imported.count(OURS),
+        "modules": imported.count(PACKAGE),
         "packages": sorted(others & set(imported)),
         "memory": peak,
         "warnings": list(run.warnings),

@@ -1,8 +1,7 @@
-"""What the runners of all kinds of models share: preparation, the timed solution, histories, and a gain of energy.
+"""Base class of the runners of all kinds of models: preparation, timed solution, histories, check of energy gain.
 
-Offline is what is done once for any start: discretisation, linearisation, modes, and here the static start. Online is
-the solver alone, from the start to the end of the run. The event loop is compiled before a clock starts: a machine pays
-that once.
+Offline: discretisation, linearisation, modes, and here the static start. Online: the solver alone, from the start to
+the end of the run. The event loop is compiled before the timing starts, since a machine compiles it once.
 """
 
 from __future__ import annotations
@@ -16,20 +15,20 @@ import numpy as np
 from multiphi_exudyn.mathematics.compiling.compiled import available, compile_entries
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.running.timing import repeated, timed
-from multiphi_exudyn.study.scene.workbench import Workbench, start_of
+from multiphi_exudyn.study.scene.workbench import Workbench, start_equilibrium
 from reference_models.full_run import ENERGY_GAIN, EnergyBalance
 
-__all__ = ["ENERGY_INTERVAL", "Runner", "modes_words"]
+__all__ = ["ENERGY_INTERVAL", "Runner", "modes_text"]
 
 ENERGY_INTERVAL = 1e-3  # s, between samples of the energy
 
 
 @dataclass(frozen=True)
 class Runner(ABC):
-    """One model of a scene as it is run. spec: its entry; the others: see ``run_model``."""
+    """Runner of one model of a scene. spec: its entry in the scene; other fields: see ``run_model``."""
 
-    compiled: ClassVar[bool] = False  # whether its own loop is
-    in_steps: ClassVar[bool] = False  # whether it may gain energy, which nothing in a released structure gives
+    compiled: ClassVar[bool] = False  # whether the solver needs the compiled loop
+    may_gain_energy: ClassVar[bool] = False  # whether time integration may gain energy, an error
 
     bench: Workbench
     spec: Any
@@ -40,72 +39,72 @@ class Runner(ABC):
     @property
     @abstractmethod
     def label(self) -> str:
-        """How tables and figures call it."""
+        """Name of the model in tables and figures."""
 
     def prepare(self) -> Any:
-        """What is done offline: the Multi-Phi model and its start, unless a kind needs something else."""
+        """Do the offline part; by default build the Multi-Phi model and its start equilibrium."""
         model = self.bench.model(self.spec)
-        return model, start_of(self.bench, model)
+        return model, start_equilibrium(self.bench, model)
 
     @abstractmethod
     def solve(self, prepared: Any) -> tuple[Any, float]:
-        """The answer, and what the solver took for it [s]."""
+        """Solve, and return the answer and the time of the solver [s]."""
 
     @abstractmethod
     def outcome(self, prepared: Any, answer: Any) -> dict[str, Any]:
-        """The fields of a ModelRun that say how it ended and in what it was computed."""
+        """Fields of a ModelRun about status, size and steps."""
 
     @abstractmethod
     def histories(self, prepared: Any, answer: Any) -> dict[str, Any]:
-        """The fields of a ModelRun on the common grid, of an answer that reached the end."""
+        """Fields of a ModelRun on the common grid, for an answer that reached the end."""
 
     def repeats(self, answer: Any) -> int:
-        """How often an answer is computed again, for its time; more often where that is short."""
+        """Number of timed repeats, more for a short run."""
         return self.bench.repeats
 
     def run(self) -> ModelRun:
         """Prepare, solve and sample."""
         if self.compiled and available():
             compile_entries()
-        prepared, building = timed(self.prepare)
+        prepared, preparation_s = timed(self.prepare)
         answer, first = self.solve(prepared)
         repeats = repeated(lambda: self.solve(prepared)[1], first, self.repeats(answer))
         run = ModelRun(
             name=self.spec.name,
             kind=self.spec.kind,
             label=self.label,
-            offline_s=self.bench.structure_s + building,
+            offline_s=self.bench.structure_s + preparation_s,
             first_s=first,
             repeats_s=repeats,
         )
         run = replace(run, **self.outcome(prepared, answer))
         if not run.ok:
             return run
-        histories, sampling = timed(lambda: self.histories(prepared, answer))
-        fields: dict[str, Any] = {"time": self.bench.time, "sampling_s": sampling}
-        whole = replace(run, **fields | histories)
-        gained = _energy_gain(whole) if self.in_steps else ""
-        return replace(run, status="failed", message=gained) if gained else whole
+        histories, sampling_s = timed(lambda: self.histories(prepared, answer))
+        fields: dict[str, Any] = {"time": self.bench.time, "sampling_s": sampling_s}
+        complete = replace(run, **fields | histories)
+        cause = _energy_gain(complete) if self.may_gain_energy else ""
+        return replace(run, status="failed", message=cause) if cause else complete
 
-    def level_words(self) -> str:
-        """Which levels a model has, as part of its label."""
+    def level_text(self) -> str:
+        """Kind of levels, as part of a label."""
         contacts = self.bench.contacts(self.spec.rigid)
         if not contacts:
             return "levels of force laws" if self.bench.mechanics.force_laws else "levels of friction"
         return f"{'rigid' if all(contact.rigid for contact in contacts) else 'compliant'} levels"
 
-    def printed_words(self) -> str:
-        """That levels have printed frequencies, as part of a label."""
+    def printed_text(self) -> str:
+        """Note on printed frequencies, as part of a label; else empty."""
         return ", printed frequencies" if self.bench.overrides else ""
 
 
-def modes_words(modes: object) -> str:
-    """How many modes a model has: "r = 12", "all modes"."""
+def modes_text(modes: object) -> str:
+    """Number of modes as text: "r = 12", "all modes"."""
     return "all modes" if modes == "all" else f"r = {modes}"
 
 
 def _energy_gain(run: ModelRun) -> str:
-    """The cause of a failure, or "": the energy has risen above an earlier value."""
+    """Message if the energy has risen above an earlier value; empty if not."""
     balance = EnergyBalance.of(run.energy_time, run.energy, np.zeros_like(run.energy))
     if balance.gain_at is None:
         return ""

@@ -1,4 +1,4 @@
-"""Runs one model of a scene; a failure is a run with its cause, not an exception.
+"""Run one model of a scene; a failure gives a run with a cause, not an exception.
 
 Every kind of model (multiphi_exudyn.study.scene.model_kinds) has a runner.
 """
@@ -37,8 +37,8 @@ def run_model(
 ) -> ModelRun:
     """Run the scene's model ``name``; a failed run has status "failed" and its cause.
 
-    retry: a full beam that fails is tried again at gentler settings; not for a study that judges the settings.
-    horizon: a reduced model is run once more, nudged. Its warnings are those of the run, and not issued here.
+    retry: run a failed full beam again with smaller steps and more damping; not for a study of these settings.
+    horizon: run a reduced model once more from a perturbed start. Warnings are stored in the run, not issued.
     """
     spec = bench.scene.models[name]
     runner = RUNNERS[spec.kind](bench, spec, progress, retry, horizon)

@@ -9,24 +9,24 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["ModelRun", "from_arrays", "interval_array", "to_arrays", "way"]
+__all__ = ["ModelRun", "from_arrays", "interval_array", "path_length", "to_arrays"]
 
 
 @dataclass(frozen=True)
 class ModelRun:
-    """What a model answered; a failed one has a status, a cause and no histories.
+    """Result of one model. A failed run has a status and a cause, and no histories.
 
-    kind: as in a scene's file. label: for tables and figures. dofs: coordinates integrated.
+    kind: as in the scene file. label: for tables and figures. dofs: number of coordinates integrated.
     time: (k,) s, the same for every run of a comparison. points [m], gaps [m], contact_force [N]: (k,) each.
     contact_intervals: contact -> (m, 2) s. impulse: contact -> N s to the end of the run.
     friction_force [N], slip [m]: (k,) each, of every friction; stick_intervals: friction -> (m, 2) s.
     energy_time (j,) s, energy (j,) J: kinetic + strain, compliant contacts included. ledger: J, row by row.
     steps: time steps, or events where a model has no steps.
-    offline_s: building, linearising, static start. first_s: the solver alone, from the start to the end, the
-    first time; repeats_s: the same again. sampling_s: the histories put on the common grid afterwards.
-    indicators: end of the window [s] -> the model's own estimate of its truncation error; none of other models.
-    warnings: what to distrust in a reduced model's answer (``Trajectory.warnings``). horizon_s: tolerance -> until when
-    [s] the model, nudged, stays as near to itself (``Trajectory.horizon``); only of reduced models that were asked.
+    offline_s: building, linearising, static start. first_s: solver alone, first run from start to end; repeats_s: its
+    repeats. sampling_s: interpolation of the histories on the common grid after the run.
+    indicators: end of the window [s] -> the model's own estimate of its truncation error; empty for other models.
+    warnings: of a reduced model (``Trajectory.warnings``). horizon_s: tolerance -> time [s] up to which the same run
+    from a perturbed start differs by less (``Trajectory.horizon``); only for reduced models, on request.
     """
 
     name: str
@@ -63,26 +63,26 @@ class ModelRun:
 
     @property
     def online_s(self) -> float:
-        """Median of the repeats [s]; the first run where it was not repeated."""
+        """Median time of the repeats [s], or of the first run if there are no repeats."""
         return statistics.median(self.repeats_s) if self.repeats_s else self.first_s
 
     def slipped(self, friction: str) -> float:
-        """Length [m] of the way, to and fro, of a friction's patch."""
-        return way(self.slip[friction])
+        """Distance [m] that a friction has slipped, both directions added."""
+        return path_length(self.slip[friction])
 
 
-def way(places: np.ndarray) -> float:
-    """Length [m] of the way, to and fro, through places (k,) [m]."""
-    return float(np.sum(np.abs(np.diff(places))))
+def path_length(positions: np.ndarray) -> float:
+    """Length [m] of the path through positions (k,) [m], both directions added."""
+    return float(np.sum(np.abs(np.diff(positions))))
 
 
-def interval_array(given: Sequence[tuple[float, float]]) -> np.ndarray:
-    """Contact intervals as (m, 2), also where there are none."""
-    return np.array(given, dtype=float).reshape(-1, 2)
+def interval_array(intervals: Sequence[tuple[float, float]]) -> np.ndarray:
+    """Intervals as an array (m, 2); (0, 2) for none."""
+    return np.array(intervals, dtype=float).reshape(-1, 2)
 
 
 def to_arrays(run: ModelRun) -> dict[str, np.ndarray]:
-    """The whole run as arrays, "FIELD" or "FIELD/NAME", numbers and texts without dimension."""
+    """All fields of the run as arrays named "FIELD" or "FIELD/NAME"; numbers and texts have no dimension."""
     arrays: dict[str, np.ndarray] = {}
     for each in fields(run):
         value = getattr(run, each.name)
@@ -94,13 +94,13 @@ def to_arrays(run: ModelRun) -> dict[str, np.ndarray]:
 
 
 def from_arrays(arrays: Mapping[str, np.ndarray]) -> ModelRun:
-    """The run that ``to_arrays`` was given."""
-    given: dict[str, Any] = {}
+    """The run from the arrays of ``to_arrays``."""
+    values: dict[str, Any] = {}
     for key, array in arrays.items():
         name, _, entry = key.partition("/")
         value = array if array.ndim else array.item()
         if entry:
-            given.setdefault(name, {})[entry] = value
+            values.setdefault(name, {})[entry] = value
         else:
-            given[name] = value
-    return ModelRun(**given | {name: tuple(given[name].tolist()) for name in ("repeats_s", "warnings")})
+            values[name] = value
+    return ModelRun(**values | {name: tuple(values[name].tolist()) for name in ("repeats_s", "warnings")})

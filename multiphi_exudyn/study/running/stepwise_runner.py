@@ -1,7 +1,7 @@
-"""Runs models that take steps outside Exudyn: the reduced equations through scipy's solve_ivp, and a Craig-Bampton
+"""Run models with time steps outside Exudyn: the reduced equations through scipy's solve_ivp, and a Craig-Bampton
 component by exact free motion with penalty forces in between (reference_models/splitting.py).
 
-A step size control that is asked for too little can feed energy to the highest modes; such a run has failed.
+Step size control with a loose tolerance can add energy to the highest modes; such a run has failed.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
-from multiphi_exudyn.study.running.runner import ENERGY_INTERVAL, Runner, modes_words
+from multiphi_exudyn.study.running.runner import ENERGY_INTERVAL, Runner, modes_text
 from multiphi_exudyn.study.running.runs import interval_array
 from multiphi_exudyn.study.running.timing import timed
 from multiphi_exudyn.study.scene.workbench import start_configuration
@@ -24,13 +24,13 @@ from reference_models.stepwise import StepwiseHistories, StepwiseRun, solve_step
 __all__ = ["SplittingRunner", "StepwiseRunner"]
 
 
-class _InSteps(Runner):
-    """A method whose answer gives histories of points at any times."""
+class _StepRunner(Runner):
+    """Runner of a method whose answer has histories at arbitrary times."""
 
-    in_steps = True
+    may_gain_energy = True
 
     def sampler(self, answer: Any) -> Callable[[Sequence[str], np.ndarray], StepwiseHistories]:
-        """What gives the histories of points at times (k,) [s]."""
+        """Return the function that evaluates histories of points at times (k,) [s]."""
         return answer.histories
 
     def histories(self, prepared: Any, answer: StepwiseRun | SplittingRun) -> dict[str, Any]:
@@ -50,18 +50,18 @@ class _InSteps(Runner):
         }
 
 
-class StepwiseRunner(_InSteps):
+class StepwiseRunner(_StepRunner):
     """The reduced equations of a Multi-Phi model by solve_ivp."""
 
     @property
     def label(self) -> str:
         method = f"{self.spec.method}, rtol {self.spec.rtol:g}"
-        return f"solve_ivp, {method}, compliant levels, {modes_words(self.spec.modes)}"
+        return f"solve_ivp, {method}, compliant levels, {modes_text(self.spec.modes)}"
 
     def solve(self, prepared: tuple[MultiPhiModel, Equilibrium]) -> tuple[StepwiseRun, float]:
         model, start = prepared
-        given = {"method": self.spec.method, "rtol": self.spec.rtol}
-        return timed(lambda: solve_stepwise(model, self.bench.t_end, start.displacement, **given))
+        options = {"method": self.spec.method, "rtol": self.spec.rtol}
+        return timed(lambda: solve_stepwise(model, self.bench.t_end, start.displacement, **options))
 
     def outcome(self, prepared: Any, answer: StepwiseRun) -> dict[str, Any]:
         return {
@@ -72,8 +72,8 @@ class StepwiseRunner(_InSteps):
         }
 
 
-class SplittingRunner(_InSteps):
-    """A Craig-Bampton component by Strang splitting; an explosion is a failed run."""
+class SplittingRunner(_StepRunner):
+    """A Craig-Bampton component by Strang splitting; a motion that overflows is a failed run."""
 
     compiled = True
 
@@ -100,6 +100,6 @@ class SplittingRunner(_InSteps):
         return {
             "dofs": len(prepared[0].squares),
             "status": "ok" if answer.finite else "failed",
-            "message": "" if answer.finite else "its motion has grown beyond all numbers",
+            "message": "" if answer.finite else "its displacements overflow",
             "steps": answer.steps,
         }

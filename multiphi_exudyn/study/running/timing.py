@@ -11,20 +11,20 @@ __all__ = ["repeated", "timed"]
 T = TypeVar("T")
 
 REPEAT_BUDGET_S = 2.0  # s; a run that takes longer is timed once
-STEADY_S = 0.1  # s, over which runs of milliseconds are repeated: a machine is now faster, now slower
+STEADY_S = 0.1  # s, over which short runs are repeated: a machine's speed varies
 
 
 def timed(run: Callable[[], T]) -> tuple[T, float]:
-    """What ``run`` gives, and the seconds it took."""
+    """Result of ``run``, and its wall-clock time [s]."""
     started = time.perf_counter()
     result = run()
     return result, time.perf_counter() - started
 
 
 def repeated(run: Callable[[], float], first: float, fewest: int) -> tuple[float, ...]:
-    """Times [s] of the repeats of a run that took ``first`` [s] and gives the time it takes.
+    """Times [s] of the repeats of a run, which returns its time and took ``first`` [s] before.
 
-    There are ``fewest`` of them as far as they fit into REPEAT_BUDGET_S, none for 0; more of short runs, for STEADY_S.
+    At least ``fewest`` repeats (0: none), fewer where REPEAT_BUDGET_S ends, more for short runs until STEADY_S.
     """
     repeats: list[float] = []
     spent = 0.0

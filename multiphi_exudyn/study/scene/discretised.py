@@ -1,6 +1,6 @@
-"""Discretised beams: M, K, points and rigid-body motion of a scene's beams, made once for all scenes that share them.
+"""Discretised beams: M, K, points and rigid-body motion of a scene's beams, cached for scenes with the same beams.
 
-They are the linearised full beams of a kind, or, where no full model of the scene discretises them, linear elements.
+They are linearised full beams, or linear elements for scenes without a full model.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from reference_models.full_beam import FullBeam, FullBeamSettings
 
 __all__ = ["LinearBeams", "Mesh", "discretised"]
 
-KEPT = 32  # discretised beams kept for later scenes; each is a few matrices of some 100 DoFs
+CACHE_SIZE = 32  # discretised beams in the cache; each is a few matrices of some 100 DoFs
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """Beams, and what discretises them: a kind of full beam (None: linear elements), and how many elements of each.
+    """Beams with their discretisation: kind of full beam (None: linear elements), and number of elements of each beam.
 
-    written: the beams in full, by which meshes are compared.
+    written: text of all beam data, by which meshes are compared.
     """
 
     beams: Beams = field(compare=False)
@@ -38,7 +38,7 @@ class Mesh:
 
     @classmethod
     def of(cls, beams: Beams, kind: str | None, elements: int) -> Mesh:
-        """Beams in elements of a kind."""
+        """Mesh of beams with a kind and a number of elements."""
         return cls(beams, kind, elements, repr(asdict(beams)))
 
 
@@ -65,20 +65,20 @@ class LinearBeams:
         return np.asarray(np.linalg.solve(self.structure.mass, inertia))
 
 
-@functools.lru_cache(maxsize=KEPT)
+@functools.lru_cache(maxsize=CACHE_SIZE)
 def discretised(mesh: Mesh) -> tuple[FullBeam | LinearBeams, float]:
-    """The beams without contacts, and what it took to make them the first time [s]."""
+    """Return the discretised beams without contacts, and the time of their first computation [s]."""
     started = time.perf_counter()
     if mesh.kind is None:
-        made: FullBeam | LinearBeams = LinearBeams(mesh.beams, mesh.elements)
+        beams: FullBeam | LinearBeams = LinearBeams(mesh.beams, mesh.elements)
     else:
-        made = FullBeam(mesh.beams, (), FullBeamSettings(kind=mesh.kind, elements=mesh.elements))
-    return made, time.perf_counter() - started
+        beams = FullBeam(mesh.beams, (), FullBeamSettings(kind=mesh.kind, elements=mesh.elements))
+    return beams, time.perf_counter() - started
 
 
 def _inertia(beam: Beam, elements: int) -> np.ndarray:
-    """Of the free coordinates of a beam as linear elements, moved by 1 as a whole."""
+    """Inertia force (n,) on the free coordinates of a beam of linear elements under a unit acceleration."""
     free = planar_beam(replace(beam, clamp=Clamp(0.0, 0.0)), elements)
-    inertia = free.mass[:, ::2].sum(axis=1)  # deflections and rotations take turns
+    inertia = free.mass[:, ::2].sum(axis=1)  # deflections and rotations alternate
     springs = (beam.clamp.translation, beam.clamp.rotation)
     return np.delete(inertia, [dof for dof, spring in enumerate(springs) if math.isinf(spring)])

@@ -36,7 +36,7 @@ __all__ = [
     "by_key",
     "inside",
     "numbered",
-    "place_in_words",
+    "place_phrase",
 ]
 
 REMARK = re.compile(r"^    (\w+): .*?  # (.*)$", re.MULTILINE)
@@ -87,7 +87,7 @@ def numbered(name: str, i: int) -> str:
     return name.replace("{i}", str(i))
 
 
-def place_in_words(at: str | Mapping[str, float]) -> str:
+def place_phrase(at: str | Mapping[str, float]) -> str:
     """A place as part of a sentence."""
     return at if isinstance(at, str) else " and ".join(f"{factor:+g} {name}" for name, factor in at.items())
 

@@ -16,7 +16,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from multiphi_exudyn.mechanics.force_law import ForceLaw
-from multiphi_exudyn.study.scene.fields import Finite, Name, NotZero, Place, Positive, Table, place_in_words
+from multiphi_exudyn.study.scene.fields import Finite, Name, NotZero, Place, Positive, Table, place_phrase
 
 __all__ = ["CubicLawSpec", "HertzLawSpec", "LawSpec", "MagnetLawSpec", "TableLawSpec"]
 
@@ -27,11 +27,11 @@ class _Law(Table):
     name: Name
     at: Place  # a point, or {point = coefficient, ...}
 
-    def in_words(self) -> str:
+    def phrase(self) -> str:
         """The law as part of a sentence."""
-        return f"the force law {self.name} at {place_in_words(self.at)} ({self._words()})"
+        return f"the force law {self.name} at {place_phrase(self.at)} ({self._parameters_phrase()})"
 
-    def _words(self) -> str:
+    def _parameters_phrase(self) -> str:
         raise NotImplementedError
 
 
@@ -45,7 +45,7 @@ class _FollowedLaw(_Law):
     def _shape(self, q: Any) -> Any:
         raise NotImplementedError
 
-    def built(self) -> ForceLaw:
+    def build(self) -> ForceLaw:
         """Its shape followed by segments; raises the errors of ForceLaw."""
         return ForceLaw(self.at, self._shape, self.tolerance, self.name, self.span, self.segments)
 
@@ -57,11 +57,11 @@ class TableLawSpec(_Law):
     q: tuple[Finite, ...]  # m, ascending
     force: tuple[Finite, ...]  # F, N
 
-    def built(self) -> ForceLaw:
+    def build(self) -> ForceLaw:
         """Its lines; raises the errors of ForceLaw."""
         return ForceLaw(self.at, (self.q, self.force), name=self.name)
 
-    def _words(self) -> str:
+    def _parameters_phrase(self) -> str:
         return f"a table of {len(self.q)} places"
 
 
@@ -75,7 +75,7 @@ class CubicLawSpec(_FollowedLaw):
     def _shape(self, q: Any) -> Any:
         return self.k1 * q + self.k3 * q**3
 
-    def _words(self) -> str:
+    def _parameters_phrase(self) -> str:
         return f"{self.k1:g} N/m q {self.k3:+g} N/m³ q³"
 
 
@@ -93,7 +93,7 @@ class HertzLawSpec(_FollowedLaw):
     def _shape(self, q: Any) -> Any:
         return -self.stiffness * np.maximum(-q - self.gap, 0.0) ** self.exponent
 
-    def _words(self) -> str:
+    def _parameters_phrase(self) -> str:
         return f"{self.stiffness:g} N/m^{self.exponent:g} beyond a gap of {1e3 * self.gap:g} mm"
 
 
@@ -113,7 +113,7 @@ class MagnetLawSpec(_FollowedLaw):
     def _shape(self, q: Any) -> Any:
         return -self.strength * np.sign(self.distance - q) / (self.distance - q) ** 2
 
-    def _words(self) -> str:
+    def _parameters_phrase(self) -> str:
         return f"a magnet of {self.strength:g} N m² at {1e3 * self.distance:+g} mm"
 
 

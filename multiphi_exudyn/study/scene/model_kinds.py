@@ -1,7 +1,8 @@
-"""The tables ``[[models]]`` of a scene file: one class for each kind of model, with what it can take of a scene.
+"""The tables ``[[models]]`` of a scene file: one class for each kind of model, and the scenes that it supports.
 
-A kind says in ``lacks`` what it has not, in ``own_faults`` what else it cannot take; how it is called and run stands in
-its runner (multiphi_exudyn.study.running). A new kind is a class here, its place in ``ModelSpec``, and a runner.
+``unsupported`` lists the features that a kind does not support, ``special_faults`` its other limits. Its label and
+its run are in its runner (multiphi_exudyn.study.running). A new kind needs a class here, an entry in ``ModelSpec``, and
+a runner.
 """
 
 from __future__ import annotations
@@ -21,24 +22,24 @@ if TYPE_CHECKING:
 
 __all__ = ["FullModel", "ModelSpec", "ReducedModel", "UserObjectModel"]
 
-# Field, of the model's own entry where it begins with a dot; what was given; what is needed.
+# (field, given value, needed value); a field that begins with a dot is one of the model's own table.
 Fault = tuple[str, object, str]
 
-Lack = Literal["loads", "weight", "sparse", "matrices", "friction", "damping", "laws", "differences"]
+Feature = Literal["loads", "weight", "sparse", "matrices", "friction", "damping", "laws", "differences"]
 
 
-def _reasons(lack: Lack, scene: Mechanics) -> list[str]:
-    """Why a scene needs another kind of model than one that lacks something; empty where it does not."""
-    rubbing = [f"the contact {contact.name} has it" for contact in scene.contacts if contact.friction]
-    rubbing += [f"the scene has {friction.name}" for friction in scene.frictions]
+def _reasons(feature: Feature, scene: Mechanics) -> list[str]:
+    """Reasons why a scene needs a kind of model that supports ``feature``; empty for none."""
+    frictional = [f"the contact {contact.name} has it" for contact in scene.contacts if contact.friction]
+    frictional += [f"the scene has {friction.name}" for friction in scene.frictions]
     damped = [contact.name for contact in scene.contacts if contact.damping]
     points = {contact.name: len(_factors(contact.direction)) for contact in scene.contacts}
-    reasons: dict[Lack, list[str]] = {
+    reasons: dict[Feature, list[str]] = {
         "loads": ["this kind takes no loads"] if scene.loads else [],
-        "weight": ["this kind takes neither gravity nor base-motion"] if scene.carried else [],
+        "weight": ["this kind takes neither gravity nor base-motion"] if scene.needs_rigid_body_motion else [],
         "sparse": ["this kind takes dense matrices only"] if scene.sparse else [],
         "matrices": [] if scene.beams else ["this kind is made of beams, and the structure is given as matrices"],
-        "friction": [f"this kind takes no friction, and {what}" for what in rubbing],
+        "friction": [f"this kind takes no friction, and {what}" for what in frictional],
         "damping": [f"this kind takes no damped contacts, and {name} is damped" for name in damped],
         "laws": [f"this kind takes no force laws, and the scene has {law.name}" for law in scene.force_laws],
         "differences": [
@@ -47,11 +48,11 @@ def _reasons(lack: Lack, scene: Mechanics) -> list[str]:
             if count > 1
         ],
     }
-    return reasons[lack]
+    return reasons[feature]
 
 
-def _not_round(scene: Mechanics) -> Iterator[str]:
-    """Why a round support will not do."""
+def _round_support_faults(scene: Mechanics) -> Iterator[str]:
+    """Reasons why the scene cannot have a round support."""
     if scene.moving_stops:
         yield "a round support does not move"
     for contact in scene.contacts:
@@ -62,43 +63,43 @@ def _not_round(scene: Mechanics) -> Iterator[str]:
 
 
 def _factors(at: object) -> list[float]:
-    """Coefficients of the points something acts on."""
+    """Coefficients of the points of a direction."""
     return list(at.values()) if isinstance(at, Mapping) else [1.0]
 
 
 class _Model(Table):
-    """What every kind has."""
+    """Fields of every kind."""
 
     kind: str
     name: Name  # "{modes}" stands for the number of modes
 
-    lacks: ClassVar[tuple[Lack, ...]] = ()
-    penalty: ClassVar[bool] = False  # contacts by a finite stiffness alone
+    unsupported: ClassVar[tuple[Feature, ...]] = ()
+    penalty: ClassVar[bool] = False  # whether contacts need a finite stiffness
 
     @property
     def rigid(self) -> bool:
-        """Whether it takes all contacts as rigid."""
+        """Whether all contacts are rigid in this model."""
         return getattr(self, "contact", "as-given") == "rigid"
 
-    def filled(self, default: int) -> Self:
-        """The same with its number of modes, of which ``default`` is the scene's own, and that number in its name."""
+    def with_modes(self, default: int) -> Self:
+        """The table with its number of modes (``default``: that of the scene) also in its name."""
         modes = default if (given := getattr(self, "modes", None)) is None else given
         return self.model_copy(update={"modes": modes, "name": self.name.replace("{modes}", str(modes))})
 
     def faults(self, scene: Mechanics) -> Iterator[Fault]:
-        """What it cannot take of a scene."""
-        for lack in self.lacks:
-            yield from (self._another(why) for why in _reasons(lack, scene))
+        """Features of the scene that the model does not support."""
+        for feature in self.unsupported:
+            yield from (self._other_kind(why) for why in _reasons(feature, scene))
         rigid = [contact.name for contact in scene.contacts if contact.rigid and self.penalty]
         needed = f"a finite one: contacts of the model {self.name} are penalty springs"
         yield from ((f"stiffness of contact {name}", "inf", needed) for name in rigid)
-        yield from self.own_faults(scene)
+        yield from self.special_faults(scene)
 
-    def own_faults(self, scene: Mechanics) -> Iterator[Fault]:
-        """What else; nothing but for some kinds."""
+    def special_faults(self, scene: Mechanics) -> Iterator[Fault]:
+        """Further limits of a kind; most kinds have none."""
         yield from ()
 
-    def _another(self, why: str) -> Fault:
+    def _other_kind(self, why: str) -> Fault:
         return ".kind", self.kind, f"another kind: {why}"
 
 
@@ -107,9 +108,9 @@ class _Levels(_Model):
 
     contact: Literal["as-given", "rigid"] = "as-given"
 
-    def own_faults(self, scene: Mechanics) -> Iterator[Fault]:
-        """Printed frequencies are those of a rigid support."""
-        if scene.printed and not self.rigid:
+    def special_faults(self, scene: Mechanics) -> Iterator[Fault]:
+        """Printed frequencies need a rigid support."""
+        if scene.has_printed_frequencies and not self.rigid:
             yield ".contact", self.contact, "'rigid': the printed frequencies are of a rigid support"
 
 
@@ -126,9 +127,9 @@ class ReducedModel(_Levels):
             raise PydanticCustomError("modes", "modes or tolerance, not both")
         return self
 
-    def filled(self, default: int) -> ReducedModel:
-        """A tolerance chooses the modes."""
-        return self if self.tolerance is not None else super().filled(default)
+    def with_modes(self, default: int) -> ReducedModel:
+        """The table itself where a tolerance determines the modes."""
+        return self if self.tolerance is not None else super().with_modes(default)
 
 
 class UserObjectModel(_Levels):
@@ -150,39 +151,39 @@ class FullModel(_Model):
     newton_tolerance: Positive = 1e-5  # relative and absolute
     contact: Literal["coordinate", "circle"] = "coordinate"  # element at the node, or a round support (ancf)
 
-    lacks: ClassVar[tuple[Lack, ...]] = ("matrices",)
+    unsupported: ClassVar[tuple[Feature, ...]] = ("matrices",)
     penalty: ClassVar[bool] = True
 
-    def filled(self, default: int) -> FullModel:
-        """It has no modes."""
+    def with_modes(self, default: int) -> FullModel:
+        """The table itself: a full model has no modes."""
         return self
 
-    def own_faults(self, scene: Mechanics) -> Iterator[Fault]:
-        """Elements act on a point or between two; friction has a spring; a round support is at rest and undamped."""
+    def special_faults(self, scene: Mechanics) -> Iterator[Fault]:
+        """Contact elements act on one or two points; friction needs a spring; a round support is fixed and undamped."""
         spring = f"a finite one: friction of the model {self.name} has a spring in series"
         for contact in scene.contacts:
             if contact.friction and math.isinf(contact.tangential_stiffness):
                 yield f"tangential_stiffness of contact {contact.name}", "inf", spring
             if not _one_or_two(contact.direction):
                 acts = f"{contact.name} acts on {contact.direction}"
-                yield self._another(f"its contacts act on a point, or between two, and {acts}")
+                yield self._other_kind(f"its contacts act on a point, or between two, and {acts}")
         for i, friction in enumerate(scene.frictions):
             if friction.rigid:
                 yield f"friction[{i}].stiffness", "inf", spring
             if not _one_or_two(friction.direction):
                 acts = f"{friction.name} acts on {len(_factors(friction.direction))}"
-                yield self._another(f"its friction acts on a point, or between two, and {acts}")
+                yield self._other_kind(f"its friction acts on a point, or between two, and {acts}")
         for law in scene.force_laws:
             if (points := len(_factors(law.at))) > 1:
-                yield self._another(f"its force laws act on single points, and {law.name} acts on {points}")
+                yield self._other_kind(f"its force laws act on single points, and {law.name} acts on {points}")
         if self.contact == "circle":
-            yield from ((".contact", "circle", f"'coordinate': {why}") for why in _not_round(scene))
+            yield from ((".contact", "circle", f"'coordinate': {why}") for why in _round_support_faults(scene))
 
 
 def _one_or_two(at: object) -> bool:
-    """Whether something acts on a point, or on the difference of two."""
-    given = _factors(at)
-    return len(given) == 1 or (len(given) == 2 and sum(given) == 0 and given[0] != 0)
+    """Whether a direction is a point or the difference of two points."""
+    factors = _factors(at)
+    return len(factors) == 1 or (len(factors) == 2 and sum(factors) == 0 and factors[0] != 0)
 
 
 class CraigBamptonModel(_Model):
@@ -194,7 +195,7 @@ class CraigBamptonModel(_Model):
     newton_tolerance: Positive = 1e-6  # relative and absolute
     spectral_radius: Annotated[float, Field(ge=0, le=1)] = 1.0  # of generalised-alpha; 1: the trapezoidal rule
 
-    lacks: ClassVar[tuple[Lack, ...]] = ("sparse", "loads", "friction", "damping", "laws", "differences")
+    unsupported: ClassVar[tuple[Feature, ...]] = ("sparse", "loads", "friction", "damping", "laws", "differences")
     penalty: ClassVar[bool] = True
 
 
@@ -206,12 +207,12 @@ class StepwiseModel(_Model):
     method: Literal["RK45", "DOP853", "Radau", "BDF", "LSODA"]  # of solve_ivp
     rtol: RelativeTolerance  # its relative tolerance
 
-    lacks: ClassVar[tuple[Lack, ...]] = ("loads", "friction", "damping", "laws")
+    unsupported: ClassVar[tuple[Feature, ...]] = ("loads", "friction", "damping", "laws")
     penalty: ClassVar[bool] = True
 
-    def own_faults(self, scene: Mechanics) -> Iterator[Fault]:
-        """Printed frequencies are those of a rigid support."""
-        if scene.printed:
+    def special_faults(self, scene: Mechanics) -> Iterator[Fault]:
+        """Printed frequencies need a rigid support."""
+        if scene.has_printed_frequencies:
             yield ".kind", self.kind, "reduced: the printed frequencies are of a rigid support"
 
 
@@ -222,7 +223,7 @@ class GlobalBasisModel(_Model):
     modes: Annotated[int, Field(ge=1)] | None = None  # of each of the two levels
     contact: Literal["as-given", "rigid"] = "as-given"
 
-    lacks: ClassVar[tuple[Lack, ...]] = ("weight", "friction")
+    unsupported: ClassVar[tuple[Feature, ...]] = ("weight", "friction")
 
 
 class TrainedBasisModel(_Model):
@@ -232,7 +233,7 @@ class TrainedBasisModel(_Model):
     modes: Annotated[int, Field(ge=1)] | None = None
     training: Positive = 0.1  # s, of the scene's own motion from its start
 
-    lacks: ClassVar[tuple[Lack, ...]] = ("weight", "friction", "laws")
+    unsupported: ClassVar[tuple[Feature, ...]] = ("weight", "friction", "laws")
 
 
 class SplittingModel(_Model):
@@ -242,7 +243,7 @@ class SplittingModel(_Model):
     modes: Annotated[int, Field(ge=0)]  # with the interface held
     step: Positive  # s
 
-    lacks: ClassVar[tuple[Lack, ...]] = ("sparse", "loads", "friction", "damping", "laws")
+    unsupported: ClassVar[tuple[Feature, ...]] = ("sparse", "loads", "friction", "damping", "laws")
     penalty: ClassVar[bool] = True
 
 

@@ -1,4 +1,4 @@
-"""What a scene file describes, as mechanics: beams or matrices, contacts, force laws, friction, loads, damping."""
+"""Mechanical model described by a scene file: beams or matrices, contacts, force laws, friction, loads, damping."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Mechanics:
     """A scene's structure, given as beams or as matrices, with its contacts, force laws, friction and damping.
 
     loads: as the file gives them. parameter_set: of the paper's rig, None for any other structure.
-    assumptions: what the scene rests on beyond what is known, one sentence each.
+    assumptions: one sentence each.
     """
 
     contacts: tuple[UnilateralContact, ...] = ()
@@ -40,45 +40,45 @@ class Mechanics:
     loads: tuple[LoadSpec, ...] = ()
 
     @property
-    def rubbing(self) -> tuple[str, ...]:
-        """Names of what has a friction force: frictions, and contacts with friction."""
+    def friction_names(self) -> tuple[str, ...]:
+        """Names of the frictions and of the contacts with friction."""
         contacts = [contact.name for contact in self.contacts if contact.friction]
         return (*(friction.name for friction in self.frictions), *contacts)
 
     @property
-    def printed(self) -> bool:
-        """Whether levels have printed frequencies in place of their own."""
+    def has_printed_frequencies(self) -> bool:
+        """Whether printed frequencies replace those of the levels."""
         return self.parameter_set is not None and bool(published_override(self.parameter_set))
 
     @property
     def sparse(self) -> bool:
-        """Whether its matrices are."""
+        """Whether the matrices are sparse."""
         return self.matrices is not None and scipy.sparse.issparse(self.matrices.stiffness)
 
     @property
     def points(self) -> tuple[str, ...]:
         """Names of the structure's points."""
-        given = self.beams or self.matrices
-        assert given is not None, "a structure is beams or matrices"
-        points: Mapping[str, object] = given.points
+        structure = self.beams or self.matrices
+        assert structure is not None, "a structure is beams or matrices"
+        points: Mapping[str, object] = structure.points
         return tuple(points)
 
     @property
     def beam(self) -> Beam | None:
-        """The beam, where there is one and only one."""
+        """The beam of a structure that is one beam, else None."""
         return None if self.beams is None else self.beams.only
 
     @property
-    def directions(self) -> int:
-        """How many modes a level has less than the structure has DoFs: one for each contact, force law and friction."""
+    def direction_count(self) -> int:
+        """Number of contacts, force laws and frictions; a level has at least so many modes less than DoFs."""
         return len(self.contacts) + len(self.force_laws) + len(self.frictions)
 
     @property
-    def carried(self) -> bool:
-        """Whether a load acts along a rigid-body motion of the structure: its weight, or a moving base."""
+    def needs_rigid_body_motion(self) -> bool:
+        """Whether a load acts along a rigid-body motion of the structure: weight or a moving base."""
         return any(isinstance(load, (GravitySpec, BaseMotionSpec)) for load in self.loads)
 
     @property
     def moving_stops(self) -> bool:
-        """Whether a stop moves beside the structure."""
+        """Whether a stop moves relative to the base."""
         return any(isinstance(load, StopMotionSpec) or getattr(load, "fixed_stops", ()) for load in self.loads)

@@ -25,7 +25,7 @@ from multiphi_exudyn.study.scene.fields import (
     Table,
     by_key,
     numbered,
-    place_in_words,
+    place_phrase,
 )
 from multiphi_exudyn.study.scene.law_tables import LawSpec
 from multiphi_exudyn.study.scene.load_tables import LoadSpec
@@ -51,7 +51,7 @@ class ContactSpec(Table):
     tangential_velocity: Finite = 0.0  # m/s, of the counter-surface along it
     count: Annotated[int, Field(ge=1)] = 1  # how many contacts of this kind
 
-    def built(self) -> UnilateralContact:
+    def build(self) -> UnilateralContact:
         """The contact; raises the errors of UnilateralContact."""
         return UnilateralContact(**self.model_dump(exclude_defaults=True))
 
@@ -79,14 +79,14 @@ class FrictionSpec(Table):
     stiffness: Stiffness = math.inf  # N/m; "rigid", or not given: without a spring
     velocity: Finite = 0.0  # m/s, of the counter-surface along the direction
 
-    def built(self) -> Friction:
+    def build(self) -> Friction:
         """The friction; raises the errors of Friction."""
         return Friction(**self.model_dump())
 
-    def in_words(self) -> str:
+    def phrase(self) -> str:
         """The friction as part of a sentence."""
         spring = "without a spring" if math.isinf(self.stiffness) else f"a spring of {self.stiffness:g} N/m in series"
-        place = place_in_words(self.direction)
+        place = place_phrase(self.direction)
         return f"the friction {self.name} at {place} (at most {self.limit:g} N, {spring})"
 
 
@@ -97,7 +97,7 @@ class DisplacedStart(Table):
     measured_at: Name  # a point
     displacement: NotZero  # m
 
-    def in_words(self) -> str:
+    def phrase(self) -> str:
         """How far, as part of a sentence."""
         return f"{1e3 * self.displacement:+g} mm at {self.measured_at}"
 
@@ -108,7 +108,7 @@ class LoadedStart(Table):
     load_at: Name  # a point
     force: NotZero  # N
 
-    def in_words(self) -> str:
+    def phrase(self) -> str:
         """How strong, as part of a sentence."""
         return f"{self.force:+g} N"
 
@@ -125,7 +125,7 @@ class ModalDampingSpec(Table):
     modal_ratios: tuple[NotNegative, ...]  # 0.01 is 1 %
     beyond: NotNegative | None = None  # of all further modes; none given: undamped
 
-    def built(self) -> ModalDamping:
+    def build(self) -> ModalDamping:
         """The damping."""
         return ModalDamping(self.modal_ratios, self.beyond)
 
@@ -136,7 +136,7 @@ class RayleighDampingSpec(Table):
     alpha: NotNegative  # 1/s
     beta: NotNegative  # s
 
-    def built(self) -> RayleighDamping:
+    def build(self) -> RayleighDamping:
         """The damping."""
         return RayleighDamping(self.alpha, self.beta)
 

@@ -1,7 +1,7 @@
-"""The loads of a scene file as loads of multiphi_exudyn.mechanics.loads, and in words.
+"""The loads of a scene file as loads of multiphi_exudyn.mechanics.loads, and as phrases.
 
 Weight and base motion act along a unit rigid-body motion of the structure; a beam's is its transverse one, which
-depends on its mesh and is given here by who has the mesh.
+depends on its mesh and is an argument here.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from multiphi_exudyn.mechanics.samples import Sampled
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.mechanics.time_functions import Harmonic, Sweep, TimeFunction
-from multiphi_exudyn.study.scene.fields import inside, place_in_words
+from multiphi_exudyn.study.scene.fields import inside, place_phrase
 from multiphi_exudyn.study.scene.load_tables import (
     BaseMotionSpec,
     ConstantLoadSpec,
@@ -32,24 +32,24 @@ from multiphi_exudyn.study.scene.load_tables import (
 )
 from multiphi_exudyn.study.scene.scenes import Scene, refuse
 
-__all__ = ["described_loads", "loads_of"]
+__all__ = ["load_phrases", "loads_of"]
 
 FORCES: dict[str, Callable[..., Load]] = {"constant": ConstantLoad, "harmonic": HarmonicLoad, "sweep": SweepLoad}
 COURSES: dict[str, Callable[..., TimeFunction]] = {"harmonic": Harmonic, "sweep": Sweep}
-Given = TypeVar("Given", bound=At)  # direction of a scene file
+Direction = TypeVar("Direction", bound=At)  # direction of a scene file
 
 
 def loads_of(scene: Scene, transverse: np.ndarray | None) -> tuple[Load, ...]:
-    """The loads, in the file's order; raises MultiPhiValueError naming file and field.
+    """Build the loads in the order of the file; raises MultiPhiValueError with file and field.
 
     transverse: unit rigid-body motion along +z, None for a structure that has none.
     """
     return tuple(_load(scene, f"loads[{i}]", spec, transverse) for i, spec in enumerate(scene.file.loads))
 
 
-def described_loads(loads: Sequence[LoadSpec]) -> tuple[str, ...]:
-    """Every load in words, as parts of a sentence."""
-    return tuple(map(_described, loads))
+def load_phrases(loads: Sequence[LoadSpec]) -> tuple[str, ...]:
+    """A phrase for each load."""
+    return tuple(map(_phrase, loads))
 
 
 def _load(scene: Scene, field: str, spec: LoadSpec, transverse: np.ndarray | None) -> Load:
@@ -66,8 +66,8 @@ def _load(scene: Scene, field: str, spec: LoadSpec, transverse: np.ndarray | Non
     return FORCES[spec.kind](**spec.model_dump(exclude={"kind"}))
 
 
-def _along(scene: Scene, field: str, given: Given | None, transverse: np.ndarray | None) -> Given | np.ndarray:
-    direction = transverse if given is None else given
+def _along(scene: Scene, field: str, own: Direction | None, transverse: np.ndarray | None) -> Direction | np.ndarray:
+    direction = transverse if own is None else own
     if direction is None:
         refuse(scene, f"{field}.direction", None, "a direction: only a structure of beams has one of its own")
     return direction
@@ -85,20 +85,20 @@ def _samples(scene: Scene, field: str, spec: SampledCourse) -> Sampled:
     return inside(f"{scene.path}: {field}", lambda: Sampled.from_csv(scene.path.parent / str(spec.csv), spec.column))
 
 
-def _described(spec: LoadSpec) -> str:
+def _phrase(spec: LoadSpec) -> str:
     if isinstance(spec, GravitySpec):
         return f"a weight of {spec.acceleration:+g} m/s²"
     if isinstance(spec, BaseMotionSpec):
-        left = f", which {' and '.join(spec.fixed_stops)} does not follow" if spec.fixed_stops else ""
-        return f"a base that moves by {_in_words(spec.course, 'm')}{left}"
+        exceptions = f", which {' and '.join(spec.fixed_stops)} does not follow" if spec.fixed_stops else ""
+        return f"a base that moves by {_course_phrase(spec.course, 'm')}{exceptions}"
     if isinstance(spec, StopMotionSpec):
-        return f"a stop of {spec.contact} that moves by {_in_words(spec.course, 'm')}"
+        return f"a stop of {spec.contact} that moves by {_course_phrase(spec.course, 'm')}"
     if isinstance(spec, ConstantLoadSpec):
-        return f"a constant force of {spec.force:+g} N at {place_in_words(spec.at)}"
-    return f"a force at {place_in_words(spec.at)} of {_in_words(spec, 'N')}"
+        return f"a constant force of {spec.force:+g} N at {place_phrase(spec.at)}"
+    return f"a force at {place_phrase(spec.at)} of {_course_phrase(spec, 'N')}"
 
 
-def _in_words(spec: CourseSpec, unit: str) -> str:
+def _course_phrase(spec: CourseSpec, unit: str) -> str:
     if isinstance(spec, HarmonicCourse):
         return f"{spec.amplitude:g} {unit}, harmonic at {spec.frequency_hz:g} Hz"
     if isinstance(spec, SweepCourse):

@@ -1,4 +1,4 @@
-"""Scenes: found by name or path, read, validated; every error is one line naming file and field."""
+"""Load scenes by name or path and validate them; every error is one line with file and field."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from multiphi_exudyn.study.scene.toml_file import read_toml, validated
 
 __all__ = ["Scene", "load_scene", "refuse", "scene_data", "scene_of", "shipped_scenes"]
 
-MOST_SAMPLES = 10_000_000  # of one history: beyond that a typing error is likelier than a wish
+MOST_SAMPLES = 10_000_000  # of one history: more is probably a typing error
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A validated scene: its name, the file it came from, and the file's content."""
+    """A validated scene: name, path and content of its file."""
 
     name: str
     path: Path
@@ -29,12 +29,12 @@ class Scene:
 
     @property
     def models(self) -> dict[str, ModelSpec]:
-        """name -> model in the file's order, numbers of modes filled in; equal ones appear once."""
-        return {model.name: model for model in map(self.filled, self.file.models)}
+        """name -> model in the file's order, with their numbers of modes; equal ones appear once."""
+        return {model.name: model for model in map(self.with_modes, self.file.models)}
 
-    def filled(self, model: ModelSpec) -> ModelSpec:
+    def with_modes(self, model: ModelSpec) -> ModelSpec:
         """The model with its number of modes, and that number in its name."""
-        return model.filled(self.file.modes)
+        return model.with_modes(self.file.modes)
 
 
 def shipped_scenes() -> dict[str, str]:
@@ -43,9 +43,9 @@ def shipped_scenes() -> dict[str, str]:
 
 
 def load_scene(source: str, *, t_end: float | None = None, modes: int | None = None) -> Scene:
-    """The scene of a shipped name or a TOML file, with its end time and number of modes replaced.
+    """Load a shipped scene or a TOML file; ``t_end`` [s] and ``modes`` replace the values of the file.
 
-    Raises MultiPhiValueError, one line: file, field, what was given, what is needed.
+    Raises MultiPhiValueError, one line: file, field, given value, needed value.
     """
     path, data = scene_data(source)
     if modes is not None:
@@ -56,7 +56,7 @@ def load_scene(source: str, *, t_end: float | None = None, modes: int | None = N
 
 
 def scene_data(source: str, folder: Path | None = None) -> tuple[Path, dict[str, Any]]:
-    """Path and raw content, with its base's, of a shipped scene or a TOML file (relative to ``folder``)."""
+    """Path and raw content, base included, of a shipped scene or of a TOML file (relative to ``folder``)."""
     path = _find(source, folder or Path())
     data = read_toml(path)
     if "scene" in data and "structure" not in data:
@@ -65,7 +65,7 @@ def scene_data(source: str, folder: Path | None = None) -> tuple[Path, dict[str,
 
 
 def scene_of(path: Path, data: Mapping[str, Any]) -> Scene:
-    """The scene of raw content, validated; ``path``: the file that errors name."""
+    """Validate raw content as a scene; ``path`` is the file named in errors."""
     scene = Scene(path.stem, path, validated(SceneFile, path, data))
     _check(scene)
     return scene
@@ -92,7 +92,7 @@ def _find(source: str, folder: Path) -> Path:
 
 
 def _with_base(path: Path, data: dict[str, Any]) -> dict[str, Any]:
-    """The scene a file is a variant of (its field ``base``), the file's own fields in place of its fields."""
+    """Content of a file merged into that of its field ``base``; the fields of the file replace those of the base."""
     if "base" not in data:
         return data
     base, shipped = data.pop("base"), _shipped()
@@ -105,7 +105,7 @@ def _with_base(path: Path, data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _check(scene: Scene) -> None:
-    """What no single field can say: a cause of motion, names that refer to models, and the size of the histories."""
+    """Check what concerns several fields: a start or loads, names of models, size of the histories."""
     file = scene.file
     if file.start is None and not file.loads:
         raise MultiPhiValueError(f"{scene.path}: start: got nothing, need a value, or loads")
@@ -113,12 +113,12 @@ def _check(scene: Scene) -> None:
     parts = {"reference": (file.comparison.reference,), "cheapest": file.comparison.cheapest}
     if file.comparison.coarser is not None:
         parts["coarser"] = (file.comparison.coarser,)
-    for part, given in parts.items():
-        for name in given:
+    for part, model_names in parts.items():
+        for name in model_names:
             if name not in names:
                 refuse(scene, f"comparison.{part}", name, one_of(name, names, "models"))
     first: dict[str, ModelSpec] = {}
-    for i, model in enumerate(map(scene.filled, file.models)):
+    for i, model in enumerate(map(scene.with_modes, file.models)):
         if first.setdefault(model.name, model) != model:
             refuse(scene, f"models[{i}].name", model.name, "another name for each model")
     if file.outputs.t_end / file.outputs.interval > MOST_SAMPLES:

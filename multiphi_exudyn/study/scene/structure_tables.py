@@ -49,7 +49,7 @@ class RigStructure(Table):
     clamp_translation: Stiffness = math.inf  # N/m
     clamp_rotation: Stiffness = math.inf  # N m/rad
 
-    def built(self, folder: Path) -> Mechanics:
+    def build(self, folder: Path) -> Mechanics:
         """The rig with its contact and damping; ``folder``: of the scene file."""
         clamp = Clamp(self.clamp_translation, self.clamp_rotation)
         return Mechanics(
@@ -131,7 +131,7 @@ class BeamSpec(Table):
     masses: tuple[MassSpec, ...] = ()
     clamp: ClampSpec = ClampSpec()
 
-    def built(self) -> Beam:
+    def build(self) -> Beam:
         """The beam with its points, masses and clamp."""
         masses = [PointMass(**mass.model_dump()) for mass in self.masses]
         clamp = Clamp(**self.clamp.model_dump())
@@ -153,9 +153,9 @@ class BeamStructure(Table):
 
     beam: BeamSpec
 
-    def built(self, folder: Path) -> Mechanics:
+    def build(self, folder: Path) -> Mechanics:
         """The beam; ``folder``: of the scene file."""
-        return Mechanics(beams=as_beams(inside(".beam", self.beam.built)))
+        return Mechanics(beams=as_beams(inside(".beam", self.beam.build)))
 
 
 class BeamsStructure(Table):
@@ -164,10 +164,10 @@ class BeamsStructure(Table):
     beams: Annotated[dict[PartName, BeamSpec], Field(min_length=1)]
     ties: tuple[TieSpec, ...] = ()
 
-    def built(self, folder: Path) -> Mechanics:
+    def build(self, folder: Path) -> Mechanics:
         """The beams; ``folder``: of the scene file."""
         return Mechanics(
-            beams=Beams({n: inside(f".beams.{n}", beam.built) for n, beam in self.beams.items()}, self.ties)
+            beams=Beams({n: inside(f".beams.{n}", beam.build) for n, beam in self.beams.items()}, self.ties)
         )
 
 
@@ -189,7 +189,7 @@ class MatrixStructure(Table):
     matrices: str | MatrixFiles
     points: Annotated[dict[Name, Annotated[int, Field(ge=0)] | str], Field(min_length=1)]
 
-    def built(self, folder: Path) -> Mechanics:
+    def build(self, folder: Path) -> Mechanics:
         """The structure with its damping; ``folder``: of the scene file."""
         structure = self._read(folder)
         return Mechanics(matrices=structure, damping=structure.damping)

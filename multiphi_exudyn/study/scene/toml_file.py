@@ -1,4 +1,4 @@
-"""Files in TOML: read, and validated against a form; every error is one line naming file and fields."""
+"""Read TOML files and validate them; every error is one line with file and fields."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ __all__ = ["kind_of", "read_toml", "tables_in", "validated"]
 
 Form = TypeVar("Form", bound=BaseModel)
 
-MOST = 12  # faults told in one line
+MOST = 12  # faults listed in one error
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Raw content of a file."""
+    """Read the raw content of a file."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
@@ -36,38 +36,40 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def validated(form: type[Form], path: Path, data: Mapping[str, Any]) -> Form:
-    """``data`` in its form; the error names ``path`` and every wrong field, those that are unknown first."""
+    """Validate ``data`` as a ``form``; the error names ``path`` and every wrong field, unknown ones first."""
     try:
         return form.model_validate_json(json.dumps(data, default=str))
     except ValidationError as error:
-        raise MultiPhiValueError(f"{path}: {_complaint(form, error, data)}") from error
+        raise MultiPhiValueError(f"{path}: {_fault_text(form, error, data)}") from error
 
 
-def _complaint(form: type[BaseModel], error: ValidationError, data: Mapping[str, Any]) -> str:
-    """Of every wrong field what was given and what is needed, in one line."""
-    found: dict[str, tuple[bool, str, list[str]]] = {}
+def _fault_text(form: type[BaseModel], error: ValidationError, data: Mapping[str, Any]) -> str:
+    """One line with every wrong field, its value and what is needed."""
+    faults_by_field: dict[str, tuple[bool, str, list[str]]] = {}
     for item in error.errors(include_url=False):
         missing, unknown = item["type"] == "missing", item["type"] == "extra_forbidden"
         field = _field(item["loc"], data, missing)
         given = "nothing" if missing else _one_line(repr(item["input"]))
-        needed = _needed(item) + (did_you_mean(item["loc"][-1], _known(form, data, item["loc"])) if unknown else "")
-        found.setdefault(field, (unknown, given, []))[2].append(needed)
+        needed = _needed(item) + (
+            did_you_mean(item["loc"][-1], _allowed_fields(form, data, item["loc"])) if unknown else ""
+        )
+        faults_by_field.setdefault(field, (unknown, given, []))[2].append(needed)
     faults = [
         f"{field}: got {given}, need {' or '.join(dict.fromkeys(needs))}"
-        for field, (_, given, needs) in sorted(found.items(), key=lambda each: not each[1][0])
+        for field, (_, given, needs) in sorted(faults_by_field.items(), key=lambda each: not each[1][0])
     ]
     more = f" (and {len(faults) - MOST} more)" if len(faults) > MOST else ""
     return "; ".join(faults[:MOST]) + more
 
 
-def _known(form: type[BaseModel], data: Any, location: Sequence[int | str]) -> set[str]:
-    """Names of the fields that the table around a place may have."""
+def _allowed_fields(form: type[BaseModel], data: Any, location: Sequence[int | str]) -> set[str]:
+    """Names of the fields allowed in the table that contains a location."""
     tables = [form]
     for part in location[:-1]:
         fields = [table.model_fields[str(part)] for table in tables if part in table.model_fields]
         tables = [inner for field in fields for inner in tables_in(field.annotation)] or tables
         if part in data if isinstance(data, Mapping) else isinstance(part, int):
-            data = data[part]  # else a label that the validator gives to the branch of a union
+            data = data[part]  # else a label of the validator for the branch of a union
     return {
         name for table in tables if data.get("kind", kind_of(table)) == kind_of(table) for name in table.model_fields
     }
@@ -82,7 +84,7 @@ def tables_in(annotation: Any) -> Iterator[type[BaseModel]]:
 
 
 def kind_of(table: type[BaseModel]) -> str | None:
-    """What the field ``kind`` of a table says; None where it has no such field."""
+    """Value of the field ``kind`` of a table class; None without such a field."""
     field = table.model_fields.get("kind")
     return typing.get_args(field.annotation)[0] if field else None
 
@@ -100,7 +102,7 @@ def _needed(item: Mapping[str, Any]) -> str:
 
 
 def _field(location: Sequence[int | str], data: Any, missing: bool) -> str:
-    """Dotted place in the file, without the labels the validator gives to the branches of a union."""
+    """Dotted path in the file, without the validator's labels of the branches of a union."""
     text = ""
     for i, part in enumerate(location):
         if isinstance(part, int) and isinstance(data, list):
@@ -113,6 +115,6 @@ def _field(location: Sequence[int | str], data: Any, missing: bool) -> str:
 
 
 def _one_line(text: object) -> str:
-    """At most 120 characters on one line."""
+    """The text on one line of at most 120 characters."""
     line = " ".join(str(text).split())
     return line if len(line) <= 120 else line[:117] + "..."

@@ -1,4 +1,4 @@
-"""What all models of a scene share: one (M, C, K), the contacts, force laws and friction, the start and the time grid.
+"""Data shared by all models of a scene: M, C, K, contacts, force laws, friction, start and time grid.
 
 The structure is the linearisation of the reference's full beams, so a reduced model and its reference
 differ in nothing but the reduction, the geometric nonlinearity and the time integration.
@@ -41,21 +41,21 @@ from reference_models.craig_bampton import independent_points
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import published_override
 
-__all__ = ["ELEMENTS", "ROUND_OFF", "Workbench", "mesh_nodes", "prepare", "start_configuration", "start_of"]
+__all__ = ["ELEMENTS", "ROUND_OFF", "Workbench", "mesh_nodes", "prepare", "start_configuration", "start_equilibrium"]
 
-START_TOLERANCE = 1e-13  # of the force, between the last two steps of the search for it
-REACHED = 1e-9  # of the displacement asked for; the full models are held to the same
+START_TOLERANCE = 1e-13  # of the force, between the last two steps of its iteration
+START_ERROR = 1e-9  # of the prescribed displacement; the same as for full models
 REPEATS = 7
-ROUND_OFF = 1 - 1e-9  # of the end of the run: a window nearer to it is the whole run
-ELEMENTS = 57  # of a beam that no full model of the scene discretises; the paper's model has as many
+ROUND_OFF = 1 - 1e-9  # of the end of the run: a window that ends later is the whole run
+ELEMENTS = 57  # of a beam in a scene without a full model, as in the paper's model
 
 
 @dataclass(frozen=True)
 class Workbench:
     """A scene ready to run.
 
-    structure: M, C, K and points. structure_s: what it took to get it [s]. time: (k,) the common grid [s].
-    repeats: of a model's online part, for its time; more where it is short.
+    structure: M, C, K and points. structure_s: time to build it [s]. time: (k,) the common grid [s].
+    repeats: number of timed repeats of a run, more for a short one.
     """
 
     scene: Scene
@@ -67,18 +67,18 @@ class Workbench:
 
     @functools.cached_property
     def longest_period(self) -> float:
-        """Of the open level without force laws [s]; infinite where it has a rigid-body mode."""
+        """Longest period of the open level without force laws [s]; infinite with a rigid-body mode."""
         lowest = float(MultiPhiModel(self.structure, modes=1).level(()).frequencies[0])
         return 1 / lowest if lowest > 0 else math.inf
 
     @property
     def points(self) -> tuple[str, ...]:
-        """The points whose histories are asked for."""
+        """Points whose histories are recorded."""
         return self.scene.file.outputs.points or self.mechanics.points
 
     @property
     def judged_points(self) -> tuple[str, ...]:
-        """The points the headline figures speak of."""
+        """Points that the headline figures refer to."""
         return self.scene.file.outputs.judged_points or self.points
 
     @property
@@ -88,15 +88,15 @@ class Workbench:
 
     @property
     def windows(self) -> tuple[float, ...]:
-        """Ends [s] of the windows that differences are given for, ascending; the last is the end of the run."""
-        named = sorted(self.scene.file.outputs.windows)
-        return (*(until for until in named if until < ROUND_OFF * self.t_end), self.t_end)
+        """Ends [s] of the windows for differences, ascending; the last is the end of the run."""
+        ends = sorted(self.scene.file.outputs.windows)
+        return (*(until for until in ends if until < ROUND_OFF * self.t_end), self.t_end)
 
     def contacts(self, rigid: bool) -> tuple[UnilateralContact, ...]:
-        """The scene's contacts, as given or all of them rigid, along the stop too where they rub."""
-        given, most = self.mechanics.contacts, math.inf
-        ideal = (replace(contact, stiffness=most, damping=0.0, tangential_stiffness=most) for contact in given)
-        return tuple(ideal) if rigid else given
+        """The scene's contacts, as given or all rigid, also tangentially."""
+        contacts, most = self.mechanics.contacts, math.inf
+        ideal = (replace(contact, stiffness=most, damping=0.0, tangential_stiffness=most) for contact in contacts)
+        return tuple(ideal) if rigid else contacts
 
     def nonlinearities(self, rigid: bool) -> tuple[UnilateralContact | ForceLaw | Friction, ...]:
         """The contacts, as given or all of them rigid, and the scene's force laws and friction."""
@@ -104,14 +104,14 @@ class Workbench:
 
     @property
     def overrides(self) -> dict[tuple[str, ...], LevelOverride]:
-        """Printed frequencies and ratios that replace the levels' own; none but for ``as-published``."""
+        """Printed frequencies and damping ratios that replace those of the levels; only for ``as-published``."""
         name = self.mechanics.parameter_set
         published = {} if name is None else published_override(name)
-        return {level: LevelOverride(given.frequencies, given.ratios) for level, given in published.items()}
+        return {level: LevelOverride(values.frequencies, values.ratios) for level, values in published.items()}
 
     @property
     def interface(self) -> tuple[str, ...]:
-        """Points a Craig-Bampton component keeps: of contacts and outputs, those independent of each other."""
+        """Interface points of a Craig-Bampton component: independent ones among contact and output points."""
         return independent_points(self.structure, dict.fromkeys([*self.contact_points, *self.points]))
 
     @property
@@ -124,8 +124,8 @@ class Workbench:
     @functools.cached_property
     def loads(self) -> tuple[Load, ...]:
         """The scene's loads on its structure."""
-        along = self.mechanics.beams is not None and self.mechanics.carried
-        return loads_of(self.scene, discretised(_mesh(self.scene, self.mechanics))[0].transverse if along else None)
+        needed = self.mechanics.beams is not None and self.mechanics.needs_rigid_body_motion
+        return loads_of(self.scene, discretised(_mesh(self.scene, self.mechanics))[0].transverse if needed else None)
 
     def loads_on(self, beam: FullBeam) -> tuple[Load, ...]:
         """The scene's loads on a full beam's own mesh."""
@@ -139,8 +139,8 @@ class Workbench:
 
     def full_beam(self, spec: FullModel) -> FullBeam:
         """The full model of a scene's entry."""
-        given = self.mechanics
-        assert given.beams is not None, "checked where the scene was loaded"
+        mechanics = self.mechanics
+        assert mechanics.beams is not None, "checked where the scene was loaded"
         settings = FullBeamSettings(
             kind=spec.beam,
             elements=spec.elements,
@@ -150,11 +150,11 @@ class Workbench:
             newton_tolerance=spec.newton_tolerance,
             output_step=self.scene.file.outputs.interval,
         )
-        return FullBeam(given.beams, given.contacts, settings, given.force_laws, given.frictions)
+        return FullBeam(mechanics.beams, mechanics.contacts, settings, mechanics.force_laws, mechanics.frictions)
 
 
 def prepare(scene: Scene, mechanics: Mechanics) -> Workbench:
-    """Build what the scene's models share; raises MultiPhiValueError naming file and field."""
+    """Build the data that the models of a scene share; raises MultiPhiValueError with file and field."""
     structure, elapsed = mechanics.matrices, 0.0
     if structure is None:
         beams, elapsed = discretised(_mesh(scene, mechanics))  # the same beams are linearised once for all scenes
@@ -163,63 +163,63 @@ def prepare(scene: Scene, mechanics: Mechanics) -> Workbench:
     grid = outputs.interval * np.arange(round(outputs.t_end / outputs.interval) + 1)
     bench = Workbench(scene, mechanics, replace(structure, damping=mechanics.damping), elapsed, grid)
     _check_modes(bench)
-    inside(f"{scene.path}: structure", lambda: bench.longest_period)  # refuses a structure that has no modes
+    inside(f"{scene.path}: structure", lambda: bench.longest_period)  # raises an error for a structure without modes
     return bench
 
 
 def start_configuration(bench: Workbench, model: MultiPhiModel) -> np.ndarray:
-    """x (n,) at rest under the scene's static load, with the right contacts of ``model`` closed; zero without one."""
-    return start_of(bench, model).displacement
+    """Static response x (n,) to the scene's start load with the contacts of ``model``; zero without a start load."""
+    return start_equilibrium(bench, model).displacement
 
 
-def start_of(bench: Workbench, model: MultiPhiModel) -> Equilibrium:
-    """The same, with the stretches of friction's springs under a load that has been applied slowly."""
+def start_equilibrium(bench: Workbench, model: MultiPhiModel) -> Equilibrium:
+    """Equilibrium under the scene's start load, applied slowly: displacement and stretches of friction springs."""
     start = bench.scene.file.start
     if start is None:
-        still = {model.links[k].name: 0.0 for k in model.held}
-        return Equilibrium(np.zeros(bench.structure.n), still)
+        stretches = {model.links[k].name: 0.0 for k in model.held}
+        return Equilibrium(np.zeros(bench.structure.n), stretches)
     if not isinstance(start, DisplacedStart):
         return model.equilibrium({start.load_at: start.force})
     row = bench.structure.row(start.measured_at)
     free = MultiPhiModel(bench.structure, modes=1).static_equilibrium({start.load_at: 1.0})
-    needed = start.displacement / float(row @ free)
+    free_force = start.displacement / float(row @ free)
 
-    def miss(share: float) -> float:
-        """Of the displacement asked for, under a share of the force it needs without contact."""
-        reached = row @ model.static_equilibrium({start.load_at: share * needed})
-        return float(reached / start.displacement - 1)
+    def deviation(share: float) -> float:
+        """Relative deviation from the prescribed displacement, under ``share`` times the force without contact."""
+        displacement = row @ model.static_equilibrium({start.load_at: share * free_force})
+        return float(displacement / start.displacement - 1)
 
-    root = scipy.optimize.root_scalar(miss, method="secant", x0=0.0, x1=1.0, xtol=START_TOLERANCE)
-    if not (root.converged and abs(miss(root.root)) <= REACHED):
+    root = scipy.optimize.root_scalar(deviation, method="secant", x0=0.0, x1=1.0, xtol=START_TOLERANCE)
+    if not (root.converged and abs(deviation(root.root)) <= START_ERROR):
         raise NumericalFailure(
             f"start: no force at {start.load_at} moves {start.measured_at} by {start.displacement:g} m"
         )
-    return model.equilibrium({start.load_at: root.root * needed})
+    return model.equilibrium({start.load_at: root.root * free_force})
 
 
 def mesh_nodes(scene: Scene, mechanics: Mechanics) -> dict[str, np.ndarray]:
-    """Of every beam, node positions (k,) [m] of the mesh that a scene's structure is made from."""
-    assert mechanics.beams is not None, "checked by who asks"
+    """Node positions (k,) [m] of every beam in the mesh of the scene's structure."""
+    assert mechanics.beams is not None, "the caller has checked it"
     elements = _mesh(scene, mechanics).elements
     return {name: beam_nodes(beam, elements) for name, beam in mechanics.beams.parts.items()}
 
 
 def _mesh(scene: Scene, mechanics: Mechanics) -> Mesh:
-    """The beams, and what discretises them: kind and elements of the reference, or of another full model."""
+    """The beams with kind and number of elements of the reference, or of another full model."""
     full = [model for model in scene.models.values() if model.kind == "full"]
-    named = [model for model in full if model.name == scene.file.comparison.reference]
-    kind, elements = next(((model.beam, model.elements) for model in named or full), (None, ELEMENTS))
+    references = [model for model in full if model.name == scene.file.comparison.reference]
+    kind, elements = next(((model.beam, model.elements) for model in references or full), (None, ELEMENTS))
     assert mechanics.beams is not None, "a structure is beams or matrices"
     return Mesh.of(mechanics.beams, kind, elements)
 
 
 def _check_modes(bench: Workbench) -> None:
-    """No model has more modes than there are."""
-    given = bench.mechanics.directions
-    most = bench.structure.n - given
+    """Check that no model has more modes than the structure."""
+    directions = bench.mechanics.direction_count
+    most = bench.structure.n - directions
     if most < 1:
         raise MultiPhiValueError(
-            f"{bench.scene.path}: structure: got {bench.structure.n} degrees of freedom and {given} contacts, "
+            f"{bench.scene.path}: structure: got {bench.structure.n} degrees of freedom and {directions} contacts, "
             "frictions or force laws, need more degrees of freedom than those"
         )
     for model in bench.scene.models.values():
@@ -230,7 +230,7 @@ def _check_modes(bench: Workbench) -> None:
 
 
 def _check_component(bench: Workbench, model: CraigBamptonModel) -> None:
-    """Every contact on a coordinate of its own, and no more modes than are left."""
+    """Check that every contact acts on an independent point, and the number of modes."""
     interface = bench.interface
     missing = [name for name in bench.contact_points if name not in interface]
     if missing:

@@ -34,8 +34,8 @@ __all__ = [
     "missed",
     "sample_contact",
     "sampling",
+    "switches_without_event",
     "truncated",
-    "untold_switches",
 ]
 
 SAMPLES_PER_PERIOD = 10_000
@@ -185,10 +185,14 @@ def missed(trajectory: Trajectory, samples: ContactSamples, table: SegmentTable,
     own, slack = _times(trajectory, name), TIME_ROUND_OFF * trajectory.t_end
     entered = (samples.apart < -tolerance) & ~samples.closed & ~samples.excused
     inside = int(entered[0]) + int(np.sum(entered[1:] & ~entered[:-1]))
-    return max(inside, _untold_signs(samples, own, slack, tolerance), untold_switches(trajectory, table, name))
+    return max(
+        inside,
+        _sign_changes_without_event(samples, own, slack, tolerance),
+        switches_without_event(trajectory, table, name),
+    )
 
 
-def untold_switches(trajectory: Trajectory, table: SegmentTable, name: str) -> int:
+def switches_without_event(trajectory: Trajectory, table: SegmentTable, name: str) -> int:
     """How often an element changes its state between segments without an event."""
     i, slack = trajectory.model.index(name), TIME_ROUND_OFF * trajectory.t_end
     switched = table.start[1:][table.states[1:, i] != table.states[:-1, i]]
@@ -200,7 +204,7 @@ def _times(trajectory: Trajectory, name: str) -> np.ndarray:
     return np.array([event.time for event in trajectory.events if event.contact == name])
 
 
-def _untold_signs(samples: ContactSamples, own: np.ndarray, slack: float, tolerance: float) -> int:
+def _sign_changes_without_event(samples: ContactSamples, own: np.ndarray, slack: float, tolerance: float) -> int:
     """Changes of the sign of a between which no event lies and which no phase excuses."""
     clear = np.flatnonzero(np.abs(samples.apart) > tolerance)
     before, after = clear[:-1], clear[1:]

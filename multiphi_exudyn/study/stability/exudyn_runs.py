@@ -1,7 +1,7 @@
 """The models inside Exudyn in a case: the reduced body as a user object, and the full model.
 
-They take steps, so nobody calls them wrong by the native criteria: shown are their drift of energy and their
-difference to the native answer. A run that stops is an outcome with Exudyn's own words.
+They use time steps, so the criteria of the native model do not apply to them: only their energy drift and their
+difference to the native run are reported. A run that stops has Exudyn's message.
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ USER_OBJECT, FULL_MODEL = "user object", "full model"
 MATCHED_PER_PERIOD = 3  # steps of the user object in the shortest kept period; matched modes need more than two
 STEPS_PER_PERIOD = 200  # of the full model in it
 FEWEST_STEPS = 200
-LARGEST_FULL = 400  # coordinates of a dense full model: above, a step takes milliseconds
-AGREEMENT = 0.01  # of the largest travel: two answers that are nearer agree
+LARGEST_FULL = 400  # coordinates of a dense full model at most, for the time of a step
+AGREEMENT = 0.01  # of the largest travel: smaller differences count as agreement
 VARYING_LOADS = (HarmonicLoad, SampledLoad, FunctionLoad, SweepLoad)
-MOST_WORDS = 200  # characters of a cause that is not our own
+MOST_WORDS = 200  # characters of the message of a foreign exception
 
 
 def run_user_object(problem: Problem, native: Trajectory, most_steps: int, limit_s: float) -> Outcome:
     """The body alone in Exudyn, its modes matched to the step where ``most_steps`` allow it."""
-    wanted = max(FEWEST_STEPS, math.ceil(problem.t_end * highest_frequency(native) * MATCHED_PER_PERIOD))
-    steps, matched = min(wanted, most_steps), wanted <= most_steps
+    needed = max(FEWEST_STEPS, math.ceil(problem.t_end * highest_frequency(native) * MATCHED_PER_PERIOD))
+    steps, matched = min(needed, most_steps), needed <= most_steps
 
     def solve() -> Outcome:
-        found, time_s = solve_body_alone(
+        histories, time_s = solve_body_alone(
             problem.model(),
             problem.displacement,
             problem.t_end,
@@ -54,18 +54,18 @@ def run_user_object(problem: Problem, native: Trajectory, most_steps: int, limit
             matched=matched,
             cpu_limit_s=limit_s,
         )
-        remark = "" if matched else f"{steps} steps allowed, {wanted} needed to match its modes: plain trapezoidal rule"
+        remark = "" if matched else f"{steps} steps allowed, {needed} needed to match its modes: plain trapezoidal rule"
         outcome = Outcome(
             USER_OBJECT,
             message=remark,
-            events=len(found.events),
+            events=len(histories.events),
             steps=steps,
             time_s=time_s,
-            warnings=found.warnings,
+            warnings=histories.warnings,
         )
-        return _compared(outcome, problem, native, found.time, found.gaps, found.slip)
+        return _with_difference(outcome, problem, native, histories.time, histories.gaps, histories.slip)
 
-    return _guarded(USER_OBJECT, solve)
+    return _outcome_of(USER_OBJECT, solve)
 
 
 def run_full_model(problem: Problem, native: Trajectory, values: int, limit_s: float) -> Outcome:
@@ -80,10 +80,10 @@ def run_full_model(problem: Problem, native: Trajectory, values: int, limit_s: f
         return Outcome(FULL_MODEL, NOT_RUN, "Exudyn's contact elements have no rigid law without rebound")
     pull = problem.pull
     if pull is not None:
-        return _guarded(FULL_MODEL, lambda: _full_beam(problem, pull, contacts, native, limit_s))
+        return _outcome_of(FULL_MODEL, lambda: _full_beam(problem, pull, contacts, native, limit_s))
     if problem.structure.n > LARGEST_FULL:
         return Outcome(FULL_MODEL, NOT_RUN, f"{problem.structure.n} coordinates, dense up to {LARGEST_FULL}")
-    return _guarded(FULL_MODEL, lambda: _full_matrices(problem, contacts, native, values, limit_s))
+    return _outcome_of(FULL_MODEL, lambda: _full_matrices(problem, contacts, native, values, limit_s))
 
 
 def _full_matrices(
@@ -93,10 +93,10 @@ def _full_matrices(
     if not all(isinstance(load, (*STATIC_LOADS, *VARYING_LOADS)) for load in problem.loads):
         return Outcome(FULL_MODEL, NOT_RUN, "a base or a stop that moves")
     structure, highest = problem.structure, highest_frequency(native)
-    wanted = max(FEWEST_STEPS, math.ceil(problem.t_end * highest * STEPS_PER_PERIOD))
-    steps = min(wanted, values // (structure.n + 1))
+    needed = max(FEWEST_STEPS, math.ceil(problem.t_end * highest * STEPS_PER_PERIOD))
+    steps = min(needed, values // (structure.n + 1))
     static = [load for load in problem.loads if isinstance(load, STATIC_LOADS)]
-    found = run_matrices(
+    run = run_matrices(
         structure,
         contacts,
         problem.t_end,
@@ -109,24 +109,24 @@ def _full_matrices(
         laws=problem.laws,
         cpu_limit_s=limit_s,
     )
-    coarse = f"{steps / (problem.t_end * highest):.3g} steps in the shortest period" if steps < wanted else ""
+    coarse = f"{steps / (problem.t_end * highest):.3g} steps in the shortest period" if steps < needed else ""
     outcome = Outcome(
         FULL_MODEL,
-        message="; ".join(filter(None, (_stands_in(problem), coarse))),
-        energy=_drift(found.energy, found.work, found.kinetic, not problem.damped),
+        message="; ".join(filter(None, (_penalty_remark(problem), coarse))),
+        energy=_drift(run.energy, run.work, run.kinetic, not problem.damped),
         steps=steps,
-        time_s=found.wall_s,
+        time_s=run.wall_s,
     )
-    return _compared(outcome, problem, native, found.time, found.gaps)
+    return _with_difference(outcome, problem, native, run.time, run.gaps)
 
 
 def _varying(problem: Problem) -> Callable[[np.ndarray], np.ndarray] | None:
-    """The loads that change, (n, k) at times (k,); None where there are none."""
-    given = [load for load in problem.loads if isinstance(load, VARYING_LOADS)]
-    if not given:
+    """Function that evaluates the varying loads (n, k) at times (k,); None without such loads."""
+    loads = [load for load in problem.loads if isinstance(load, VARYING_LOADS)]
+    if not loads:
         return None
-    rows = np.array([problem.structure.row(load.at) for load in given])
-    histories = [load.course.history(problem.t_end) for load in given]
+    rows = np.array([problem.structure.row(load.at) for load in loads])
+    histories = [load.course.history(problem.t_end) for load in loads]
     return lambda times: rows.T @ np.array([history.at(times) for history in histories])
 
 
@@ -135,7 +135,7 @@ def _full_beam(
 ) -> Outcome:
     settings = FullBeamSettings(elements=pull.elements, step=pull.step, cpu_limit_s=limit_s)
     beam = FullBeam(pull.beam, contacts, settings)
-    found = beam.run(
+    run = beam.run(
         problem.t_end,
         load_at=pull.tip,
         measured_at=pull.tip,
@@ -143,15 +143,15 @@ def _full_beam(
         damping=damping_matrix(replace(beam.structure, damping=problem.structure.damping)),
         progress=False,
     )
-    outcome = Outcome(FULL_MODEL, found.status, found.message or _stands_in(problem), steps=found.steps)
-    if found.status != OK or found.balance is None:
+    outcome = Outcome(FULL_MODEL, run.status, run.message or _penalty_remark(problem), steps=run.steps)
+    if run.status != OK or run.balance is None:
         return outcome
-    drift = _drift(found.energy, np.zeros(1), found.energy, not problem.damped)
-    outcome = replace(outcome, energy=drift, time_s=found.online_s)
-    return _compared(outcome, problem, native, found.time, found.gaps)
+    drift = _drift(run.energy, np.zeros(1), run.energy, not problem.damped)
+    outcome = replace(outcome, energy=drift, time_s=run.online_s)
+    return _with_difference(outcome, problem, native, run.time, run.gaps)
 
 
-def _stands_in(problem: Problem) -> str:
+def _penalty_remark(problem: Problem) -> str:
     rigid = any(contact.rigid for contact in problem.parts)
     return f"penalty of {problem.penalty:g} for the rigid contact: another law" if rigid else ""
 
@@ -162,12 +162,12 @@ def _drift(energy: np.ndarray, work: np.ndarray, kinetic: np.ndarray, conservati
     Both as a share of the largest energy, the kinetic one where force laws hold a negative one.
     """
     balance = energy - work
-    away = np.abs(balance - balance[0]) if conservative else balance - np.minimum.accumulate(balance)
+    deviation = np.abs(balance - balance[0]) if conservative else balance - np.minimum.accumulate(balance)
     largest = max(float(np.max(energy)), float(np.max(kinetic)))
-    return float(np.max(away)) / largest if largest > 0 else float(np.max(away))
+    return float(np.max(deviation)) / largest if largest > 0 else float(np.max(deviation))
 
 
-def _compared(
+def _with_difference(
     outcome: Outcome,
     problem: Problem,
     native: Trajectory,
@@ -190,8 +190,8 @@ def _compared(
     return replace(outcome, difference=worst, agrees_until=until)
 
 
-def _guarded(name: str, solve: Callable[[], Outcome]) -> Outcome:
-    """The outcome, or a failure with the cause that was given."""
+def _outcome_of(name: str, solve: Callable[[], Outcome]) -> Outcome:
+    """Outcome of ``solve``, or a failed outcome with the message of its exception."""
     try:
         return solve()
     except MultiPhiError as error:

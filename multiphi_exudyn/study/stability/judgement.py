@@ -31,8 +31,8 @@ from multiphi_exudyn.study.stability.brute_force import (
     missed,
     sample_contact,
     sampling,
+    switches_without_event,
     truncated,
-    untold_switches,
 )
 from multiphi_exudyn.study.stability.case import Problem
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
@@ -73,30 +73,32 @@ class Judgement:
     covered: float
 
     def complaints(self, metre: float) -> list[str]:
-        """What makes the answer wrong, one sentence each."""
+        """Violations of the criteria, one sentence each."""
         law = self.unexcused if self.truncated else self.beyond
-        found = [
+        checks = [
             (not law <= BEYOND * metre, f"{law / metre:.1e} m beyond the contact law"),
             (not self.pulling <= PULLING, f"a contact pulls with {self.pulling:.1e} of its largest reaction"),
             (not self.friction <= FRICTION, f"friction off its law by {self.friction:.1e} of its limit"),
             (self.missed > 0, f"{self.missed} closings or openings without an event"),
             (self._hidden(metre), f"open {self.open_depth / metre:.1e} m deep, {self.reported / metre:.1e} m reported"),
         ]
-        return [*self.laws, *(sentence for is_so, sentence in found if is_so)]
+        return [*self.laws, *(sentence for violated, sentence in checks if violated)]
 
     def _hidden(self, metre: float) -> bool:
-        """Whether an open contact of a truncated model lies deeper than the trajectory tells."""
+        """Whether an open contact of a truncated model penetrates deeper than the trajectory reports."""
         return self.truncated and self.open_depth > max(BEYOND * metre, self.reported / REPORTED)
 
 
 def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
     """Judge a trajectory with about ``budget`` samples of every contact."""
-    table, look, tolerance = SegmentTable.of(trajectory), sampling(trajectory, budget), BEYOND * problem.metre
+    table, grid, tolerance = SegmentTable.of(trajectory), sampling(trajectory, budget), BEYOND * problem.metre
     parts = problem.unilateral
-    seen = [sample_contact(trajectory, contact, table, look.times, problem.loads) for contact in parts]
-    beyond = [_beyond(contact, found) for contact, found in zip(parts, seen, strict=True)]
-    rubbed = [_rubbed(trajectory, friction, table, look.times) for friction in problem.frictions]
-    laws = [way for way, _, _ in rubbed] + [_beyond_law(law, trajectory, look.times) for law in problem.laws]
+    samples = [sample_contact(trajectory, contact, table, grid.times, problem.loads) for contact in parts]
+    beyond = [_beyond(contact, values) for contact, values in zip(parts, samples, strict=True)]
+    frictions = [_judge_friction(trajectory, friction, table, grid.times) for friction in problem.frictions]
+    laws = [deviation for deviation, _, _ in frictions] + [
+        _beyond_law(law, trajectory, grid.times) for law in problem.laws
+    ]
     small, ends = SMALL * problem.metre, run_laws.ends_of(trajectory)
     largest = run_laws.largest_energy(trajectory, ends, small)
     residual = _share(trajectory.ledger.residual, largest)
@@ -107,21 +109,23 @@ def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
         energy=rise,
         residual=residual,
         events=len(trajectory.events),
-        missed=sum(untold for _, _, untold in rubbed)
-        + sum(untold_switches(trajectory, table, law.name) for law in problem.laws)
+        missed=sum(count for _, _, count in frictions)
+        + sum(switches_without_event(trajectory, table, law.name) for law in problem.laws)
         + sum(
-            missed(trajectory, found, table, contact.name, tolerance)
-            for contact, found in zip(parts, seen, strict=True)
+            missed(trajectory, values, table, contact.name, tolerance)
+            for contact, values in zip(parts, samples, strict=True)
         ),
         beyond=_largest([*(np.max(values) for values in beyond), *laws]),
-        unexcused=_largest([*(np.max(v[~s.excused], initial=0.0) for v, s in zip(beyond, seen, strict=True)), *laws]),
-        open_depth=_largest([-np.min(s.apart[~s.closed], initial=0.0) for s in seen]),
-        pulling=_pulling(parts, seen),
-        friction=_largest([force for _, force, _ in rubbed]),
+        unexcused=_largest(
+            [*(np.max(v[~s.excused], initial=0.0) for v, s in zip(beyond, samples, strict=True)), *laws]
+        ),
+        open_depth=_largest([-np.min(s.apart[~s.closed], initial=0.0) for s in samples]),
+        pulling=_pulling(parts, samples),
+        friction=_largest([force for _, force, _ in frictions]),
         truncated=truncated(trajectory),
         reported=_largest([-trajectory.deepest_gap(contact.name) for contact in parts]),
-        samples=len(look.times),
-        covered=look.covered,
+        samples=len(grid.times),
+        covered=grid.covered,
     )
 
 
@@ -156,7 +160,7 @@ def _pulling(contacts: Sequence[UnilateralContact], seen: Sequence[ContactSample
     return worst
 
 
-def _rubbed(
+def _judge_friction(
     trajectory: Trajectory, friction: Friction, table: SegmentTable, times: np.ndarray
 ) -> tuple[float, float, int]:
     """Of a friction at times (k,) [s]: its way [m], its force, and changes of its state without an event."""
@@ -173,4 +177,4 @@ def _rubbed(
     spring = 0.0 if friction.rigid else friction.stiffness
     force -= ROUND_OFF * spring * float(np.max(np.abs(place), initial=0.0))
     way = float(np.max(np.abs(patch - patch[0] - slip)))
-    return way, max(0.0, force) / friction.limit, untold_switches(trajectory, table, name)
+    return way, max(0.0, force) / friction.limit, switches_without_event(trajectory, table, name)

@@ -1,4 +1,4 @@
-"""The native model in a case, judged."""
+"""Run and judge the native model in a case."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 __all__ = ["NATIVE", "Native", "run_native"]
 
 NATIVE = "native"
-TRACE = "no failure of the model's own"  # said of an exception that the model should have turned into a status
+TRACE = "no failure of the model's own"  # added to an exception that should have been a status
 
 
 @dataclass(frozen=True)
 class Native:
-    """An outcome, and the trajectory it is from, None where there is none."""
+    """An outcome with its trajectory; None for a failed run."""
 
     outcome: Outcome
     trajectory: Trajectory | None = None
 
 
 def run_native(case: Case, problem: Problem, limit_s: float, budget: int) -> Native:
-    """Run a model of its own, and judge it.
+    """Run the native model of a problem, and judge the trajectory.
 
     A failure of the model is an outcome with its cause; any other exception is an outcome that is wrong.
     """
@@ -38,35 +38,35 @@ def run_native(case: Case, problem: Problem, limit_s: float, budget: int) -> Nat
         return Native(Outcome(NATIVE, FAILED, f"time limit of {limit_s:g} s"))
     except MultiPhiError as error:
         return Native(Outcome(NATIVE, FAILED, _one_line(error)))
-    except Exception as error:  # what a model lets through is a finding of this catalogue
+    except Exception as error:  # an exception that is no MultiPhiError is an error of the model
         cause = f"{type(error).__name__}: {_one_line(error)}"
         return Native(Outcome(NATIVE, FAILED, cause, (f"{cause}: {TRACE}",)))
     if trajectory.status != OK:
         return Native(Outcome(NATIVE, FAILED, trajectory.message, events=len(trajectory.events), time_s=time_s))
-    return Native(_judged(case, problem, trajectory, time_s, budget), trajectory)
+    return Native(_outcome_of(case, problem, trajectory, time_s, budget), trajectory)
 
 
 def _simulated(problem: Problem) -> Trajectory:
     return simulate(problem.model(), problem.t_end, problem.displacement, problem.velocity, problem.loads)
 
 
-def _judged(case: Case, problem: Problem, trajectory: Trajectory, time_s: float, budget: int) -> Outcome:
-    found = judge(problem, trajectory, budget)
-    special = case.check(problem, trajectory) if case.check else ""
+def _outcome_of(case: Case, problem: Problem, trajectory: Trajectory, time_s: float, budget: int) -> Outcome:
+    judgement = judge(problem, trajectory, budget)
+    fault = case.check(problem, trajectory) if case.check else ""
     return Outcome(
         NATIVE,
         message=trajectory.message,
-        wrong=(*found.complaints(problem.metre), *([special] if special else [])),
-        energy=found.energy,
-        residual=found.residual,
-        events=found.events,
-        missed=found.missed,
+        wrong=(*judgement.complaints(problem.metre), *([fault] if fault else [])),
+        energy=judgement.energy,
+        residual=judgement.residual,
+        events=judgement.events,
+        missed=judgement.missed,
         time_s=time_s,
-        samples=found.samples,
-        covered=found.covered,
-        beyond=(found.unexcused if found.truncated else found.beyond) / problem.metre,
-        excused=found.beyond / problem.metre if found.truncated else None,
-        reported=found.reported / problem.metre if found.truncated else None,
+        samples=judgement.samples,
+        covered=judgement.covered,
+        beyond=(judgement.unexcused if judgement.truncated else judgement.beyond) / problem.metre,
+        excused=judgement.beyond / problem.metre if judgement.truncated else None,
+        reported=judgement.reported / problem.metre if judgement.truncated else None,
         warnings=trajectory.warnings,
     )
 

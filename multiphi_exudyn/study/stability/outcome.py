@@ -1,4 +1,4 @@
-"""What came out of one model in one case: a row of the table."""
+"""Result of one model in one case: a row of the table."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ OK, FAILED, NOT_RUN = "ok", "failed", "not run"
 
 @dataclass(frozen=True)
 class Outcome:
-    """One row. Quantities a model does not have, or did not come to, are None.
+    """Result of one model in one case. Quantities that a model does not have are None.
 
     model: its name. status: "ok" | "failed" | "not run"; message: the cause, or a remark. wrong: what makes an answer
     that is ok wrong (native models only), one sentence each.
-    energy, residual, missed, beyond [m], excused [m], reported [m]: see judgement.py, beyond being what is judged and
-    excused what truncation leaves. energy of an Exudyn model: its drift, where damped or loaded its largest gain.
+    energy, residual, missed, beyond [m], excused [m], reported [m]: see judgement.py, beyond being the judged part and
+    excused the part due to truncation. energy of an Exudyn model: its drift, where damped or loaded its largest gain.
     difference: to the native answer, ||y - native|| / ||native|| of the contacts' travel, the worst of them;
     agrees_until: the share of the run up to the first difference above AGREEMENT of the largest travel.
-    warnings: what a reduced model says is to be distrusted in its answer.
+    warnings: of a reduced model about its result.
     steps: of an Exudyn model. samples, covered: of the brute force. time_s: of the run alone [s].
     """
 
@@ -53,10 +53,10 @@ class CaseResult:
 
     @property
     def wrong(self) -> bool:
-        """Whether one of the answers is."""
+        """Whether one of the results is wrong."""
         return any(outcome.wrong for outcome in self.outcomes)
 
     @property
     def answered(self) -> bool:
-        """Whether one of the answers is ok."""
+        """Whether one of the runs is ok."""
         return any(outcome.status == OK for outcome in self.outcomes)

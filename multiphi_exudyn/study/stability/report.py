@@ -1,4 +1,4 @@
-"""A run of the catalogue to read: the table on a terminal, and the page, one self-contained HTML file."""
+"""Reports of a run of the catalogue: a text table, and a self-contained HTML page."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WIDTHS = (7, 8, 8, 7, 6, 8, 8, 8)
 
 
 def text_table(results: Sequence[CaseResult]) -> str:
-    """All cases, then what models warn of, and the outcome in one sentence."""
+    """Text table of all cases, followed by the warnings of the models and the result in one sentence."""
     width = max(len(outcome.model) for result in results for outcome in result.outcomes)
     heads = "  ".join(f"{head:>{size}}" for head, size in zip(HEADS, WIDTHS, strict=True))
     lines = [f"  {'':{width}}  {heads}", *(line for result in results for line in _case(result, width))]
@@ -46,7 +46,7 @@ def render_stability(results: Sequence[CaseResult], environment: dict[str, Any],
 
 
 def _figure(value: float | None) -> str:
-    """A figure of which the power of ten counts."""
+    """A number with two digits and a power of ten."""
     if value is None:
         return "–"
     return "0" if value == 0 else f"{value:.1e}"
@@ -56,8 +56,8 @@ def _case(result: CaseResult, width: int) -> Iterator[str]:
     yield f"{result.name}{'  WRONG' if result.wrong else ''}"
     for outcome in result.outcomes:
         cells = "  ".join(f"{cell:>{size}}" for cell, size in zip(_cells(outcome), WIDTHS, strict=True))
-        said = "; ".join([*(f"WRONG: {sentence}" for sentence in outcome.wrong), *filter(None, [outcome.message])])
-        yield f"  {outcome.model:{width}}  {cells}  {said}".rstrip()
+        remarks = "; ".join([*(f"WRONG: {sentence}" for sentence in outcome.wrong), *filter(None, [outcome.message])])
+        yield f"  {outcome.model:{width}}  {cells}  {remarks}".rstrip()
 
 
 def _cells(outcome: Outcome) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
-"""What must hold of every run, whatever the model: each law gives a complaint, or None.
+"""Laws that hold for every run of any model: each check returns a message about a violation, or None.
 
-They know the trajectory's analytic segments and nothing of how events were found.
+The checks use the analytic segments of the trajectory, independently of the event search.
 """
 
 from __future__ import annotations
@@ -47,29 +47,29 @@ def complaints(
     varying: bool = False,
     budget: float = np.inf,
 ) -> list[str]:
-    """Everything that is wrong with a run.
+    """Messages about all violated laws of a run.
 
     samples: per shortest period. most: segments. joule, metre: in its units. varying: loads or stops vary in time,
-    whose work only the ledger knows. budget: samples of a contact on a segment, beyond which it is not looked for what
-    is missed there.
+    whose work only the ledger knows. budget: samples of a contact on a segment, above which the segment is not
+    checked for missed events.
     """
     if not run.segments:
         return [complaint for complaint in (status(run),) if complaint]
-    looked_at = ends_of(run, most)
-    scale = largest_energy(run, looked_at, joule)
-    checks = [status(run), ledger(run, scale), missed(run, looked_at, samples, metre, budget)]
+    checked = ends_of(run, most)
+    scale = largest_energy(run, checked, joule)
+    checks = [status(run), ledger(run, scale), missed(run, checked, samples, metre, budget)]
     if not varying and still(run):
-        checks.append(energy(run, looked_at, scale))
+        checks.append(energy(run, checked, scale))
     return [complaint for complaint in checks if complaint]
 
 
 def still(run: Trajectory) -> bool:
-    """Whether no counter-surface moves, whose work only the ledger knows."""
+    """Whether no counter-surface moves; its work is in the ledger only."""
     return not any(link.velocity for link in run.model.links)
 
 
 def ends_of(run: Trajectory, most: int = 60) -> list[Segment]:
-    """The first and the last segments of a run, so many at most."""
+    """The first and the last segments of a run, at most ``most`` in all."""
     return [*run.segments[: most // 2], *run.segments[max(most // 2, len(run.segments) - most // 2) :]]
 
 
@@ -96,7 +96,7 @@ def largest_energy(run: Trajectory, segments: Sequence[Segment], joule: float = 
 
 
 def _stretched(run: Trajectory) -> float:
-    """What springs of friction would hold [J] if the start had stretched them; it has not, but for round-off of it."""
+    """Energy [J] of friction springs if the start stretched them: a scale of round-off, as it does not."""
     links, places = run.model.links, run.start.displacement @ run.model.base.directions
     return sum(
         0.5 * link.stiffness * place**2
@@ -106,7 +106,7 @@ def _stretched(run: Trajectory) -> float:
 
 
 def _summed(run: Trajectory, segment: Segment) -> float:
-    """What the loads would do [J] over all terms of a motion, which may cancel: t and exp(-c t) where it is damped."""
+    """Work [J] of the loads over the absolute terms of a motion, which may cancel (t and exp(-c t) with damping)."""
     terms = np.abs(segment.level.level.vectors) @ np.sum(np.abs(segment.rows), axis=1)
     return float(np.abs(_load(run, segment)) @ terms)
 
@@ -188,26 +188,26 @@ def energy_rise(run: Trajectory, segments: Sequence[Segment], samples: int = 5) 
 def missed(
     run: Trajectory, segments: Sequence[Segment], samples: float, metre: float = 1.0, budget: float = np.inf
 ) -> str | None:
-    """No contact leaves its state's admissible range unheard: s >= 0 (events/decision.py) on every segment.
+    """No contact leaves the admissible range of its state without an event: s >= 0 (events/decision.py).
 
-    In a truncated basis this is asked of armed contacts and of closed rigid ones, which never pull. Round-off is that
-    of the whole run: an impact that stops all motion leaves a state that is round-off of the one before, and a reaction
-    has that of its coordinates.
+    In a truncated basis this is checked for armed contacts and for closed rigid ones, which never pull. Round-off is
+    that of the whole run: an impact that stops all motion leaves a state that is round-off of the one before, and a
+    reaction has that of its coordinates.
     """
     complete, reach = _complete(run), _reach(segments, SMALLEST * metre)
     largest: dict[tuple[int, str], float] = {}
-    looked_at = list(_signals(segments, run, complete))
-    for segment, contact, _, signal in looked_at:
+    checked = list(_signals(segments, run, complete))
+    for segment, contact, _, signal in checked:
         key, own = (contact, signal.of), signal.size(segment.end - segment.start)
         most = np.max(np.abs(_load(run, segment))) if signal.of == "reaction" else reach * signal.per_metre()
         largest[key] = max(largest.get(key, 0.0), own, signal.arm * most)
-    for segment, contact, heard, signal in looked_at:
+    for segment, contact, armed, signal in checked:
         if signal.samples(segment.end - segment.start, samples) > budget:
             continue
         size = largest[contact, signal.of]
         lowest, at = signal.lowest(segment.end - segment.start, samples)
         unresolved = ROUND_OFFS * np.finfo(float).eps * (segment.end * signal.steepness(at) + signal.grain * reach)
-        if lowest < -(MISSED if heard else LAW) * size - unresolved:
+        if lowest < -(MISSED if armed else LAW) * size - unresolved:
             name = run.model.contacts[contact].name
             return f"missed: {name} at {segment.start + at:.9g} s, {lowest / size:g} of its size"
     return None
@@ -216,7 +216,7 @@ def missed(
 def _signals(
     segments: Sequence[Segment], run: Trajectory, complete: bool
 ) -> Iterator[tuple[Segment, int, bool, Signal]]:
-    """(segment, contact, whether it is armed, its signal) of all that is to be looked at."""
+    """(segment, contact, whether it is armed, its signal) for all signals to be checked."""
     for segment in segments:
         phases = iter(segment.phases)
         for contact, element in enumerate(run.model.contacts):
@@ -224,16 +224,16 @@ def _signals(
             if len(run.model.link_indices[contact]) > 1:  # a contact with friction: brute force judges it
                 list(itertools.islice(phases, len(element.states[state].exits)))
                 continue
-            for made in _of(element, link in segment.level.level.indices, state):
-                phase, signal = next(phases), Signal(segment, link, *made)
+            for arguments in _signal_arguments(element, link in segment.level.level.indices, state):
+                phase, signal = next(phases), Signal(segment, link, *arguments)
                 if element.damping:
                     continue  # its signal is a force with a rate of its own: brute force judges it
                 if segment.end > segment.start and (phase is Phase.ARMED or complete or signal.of == "reaction"):
                     yield segment, contact, phase is Phase.ARMED, signal
 
 
-def _of(element: Element, closed: bool, state: int) -> list[tuple[str, float, float]]:
-    """Of what an element's signals are made in a state, with which factor and constant."""
+def _signal_arguments(element: Element, closed: bool, state: int) -> list[tuple[str, float, float]]:
+    """Quantity, factor and constant of each signal of an element in a state."""
     if isinstance(element, Friction):
         if closed:
             kind = "reaction" if element.rigid else "tension"
@@ -245,7 +245,7 @@ def _of(element: Element, closed: bool, state: int) -> list[tuple[str, float, fl
 
 
 def _reach(segments: Sequence[Segment], smallest: float) -> float:
-    """The largest coordinate y of the run, within segments too: what a gap that never moves is the difference of."""
+    """Largest coordinate y of the run, also within segments: the scale of round-off of a gap at rest."""
     times = [np.linspace(segment.start, segment.end, INSIDE) for segment in segments]
     places = [segment.level.configuration(segment.modal(t)) for segment, t in zip(segments, times, strict=True)]
     return max([smallest, *(float(np.max(np.abs(y), initial=0.0)) for y in places)])

@@ -100,11 +100,11 @@ class Signal:
             lower = np.r_[True, g[1:] <= g[:-1]] & np.r_[g[:-1] <= g[1:], True]
             best = min(best, (float(np.min(g)), float(t[np.argmin(g)])))
             for place in t[doubtful & lower]:
-                if not self._falls_away(place, step * curvature, duration):
+                if not self._is_end_minimum(place, step * curvature, duration):
                     best = min(best, self._polished(place, step, duration))
         return best
 
-    def _falls_away(self, place: float, change: float, duration: float) -> bool:
+    def _is_end_minimum(self, place: float, change: float, duration: float) -> bool:
         """Whether an end of the interval is the lowest place near it: the slope there cannot turn within a step."""
         if step_inside := int(place <= 0) - int(place >= duration):
             rate = self.basis.at(place) @ self.basis.derivative(self.coefficients)

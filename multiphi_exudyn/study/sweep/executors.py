@@ -142,7 +142,7 @@ def _start_worker(end: Connection) -> None:
 
 
 def _end_with(end: Connection) -> None:
-    """End this process when nobody holds the other end of the pipe any more; nothing is ever sent through it."""
+    """End this process when the other end of the pipe is closed; no data are sent through it."""
     end.poll(None)
     os._exit(1)
 
@@ -169,7 +169,7 @@ def _cluster(address: str) -> Iterator[Executor]:
     try:
         client = distributed.Client(address, timeout=ANSWER_S, set_as_default=False)
     except OSError:
-        raise MultiPhiValueError(f"where: nobody answers at {address}; need a running Dask scheduler") from None
+        raise MultiPhiValueError(f"where: no answer at {address}; need a running Dask scheduler") from None
     with client:
         try:
             client.wait_for_workers(1, timeout=ANSWER_S)

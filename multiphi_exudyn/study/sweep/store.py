@@ -14,7 +14,7 @@ from what it has lost. Runs at the end of the log that cannot be read are lost a
 MultiPhiWarning says how many.
 
 A run's key is (name, sha256 of its parameters' canonical JSON): sorted, without blanks, 1 and 1.0 being different.
-A new file is made under a temporary name and linked to its own, so that nobody ever sees a part of it.
+A new file is made under a temporary name and linked to its own, so that no process sees an incomplete file.
 """
 
 from __future__ import annotations
@@ -93,8 +93,8 @@ class Store:
     def find(self, name: str, parameters: Mapping[str, Any]) -> Row | None:
         """The run with these parameters; None where it is not there."""
         with self._sound():
-            found = self._connection.execute(f"{ROW} AND key = ?", (name, key_of(parameters))).fetchone()
-            return None if found is None else _row(found)
+            columns = self._connection.execute(f"{ROW} AND key = ?", (name, key_of(parameters))).fetchone()
+            return None if columns is None else _row(columns)
 
     def histories(self, name: str, parameters: Mapping[str, Any]) -> dict[str, np.ndarray] | None:
         """The run's arrays; None where none were kept."""
@@ -103,8 +103,8 @@ class Store:
             found = self._connection.execute(question, (name, key_of(parameters))).fetchone()
             if found is None or found == (None, None):
                 return None
-            packed, known = found
-            if not isinstance(packed, bytes) or hashlib.sha256(packed).hexdigest() != known:
+            packed, checksum = found
+            if not isinstance(packed, bytes) or hashlib.sha256(packed).hexdigest() != checksum:
                 raise _Damaged("the histories of a run are not those that were stored")
         with np.load(io.BytesIO(packed), allow_pickle=False) as arrays:
             return dict(arrays)
@@ -149,21 +149,21 @@ class Store:
 
 
 class _Damaged(Exception):
-    """What was stored is not there any more; the message says what."""
+    """Stored data have changed or are missing; the message says which."""
 
 
-FULL = "database or disk is full"  # SQLite's words for it
+FULL = "database or disk is full"  # SQLite's message
 READING = (sqlite3.Error, UnicodeDecodeError, _Damaged)  # raised where a file is damaged
 
 
 def _sum(*columns: Any) -> str:
-    """sha256 of what a run is read from."""
+    """sha256 of the columns of a run."""
     return hashlib.sha256(repr(columns).encode()).hexdigest()
 
 
-def _row(found: tuple[Any, ...]) -> Row:
-    *columns, known = found
-    if _sum(*columns) != known:
+def _row(fields: tuple[Any, ...]) -> Row:
+    *columns, checksum = fields
+    if _sum(*columns) != checksum:
         raise _Damaged("a run is not the one that was stored")
     _, _, parameters, status, message, values, elapsed_s, finished, _, environment = columns
     content = json.loads(parameters), json.loads(values), json.loads(environment)
@@ -171,25 +171,25 @@ def _row(found: tuple[Any, ...]) -> Row:
 
 
 def _check(connection: sqlite3.Connection) -> None:
-    """Raises where the file is not whole: its pages and indices, and the runs' numbers 1 to their count."""
-    (said,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
-    if said != "ok":
-        raise _Damaged(" ".join(str(said).split()))
+    """Raise an error for damaged pages or indices, or gaps in the numbers of the runs."""
+    (result,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
+    if result != "ok":
+        raise _Damaged(" ".join(str(result).split()))
     count, last = connection.execute("SELECT count(*), coalesce(max(number), 0) FROM runs").fetchone()
     if count != last:
         raise _Damaged(f"{count} runs where the last one has the number {last}")
 
 
-def _tell_lost(path: Path, log: Log, connection: sqlite3.Connection) -> None:
-    """Warn of transactions of a log, as it was before the file was opened, that SQLite has not taken."""
+def _warn_lost(path: Path, log: Log, connection: sqlite3.Connection) -> None:
+    """Warn of transactions in the log, as it was before opening, that SQLite could not read."""
     _, read, _ = connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
     page = connection.execute("PRAGMA page_size").fetchone()[0]
     if read >= 0 and log.commits and read_log(path, page).salt == log.salt and (lost := log.lost(read)):
-        told = (
+        message = (
             f"lost runs: up to {lost} runs at the end of the log of {path} cannot be read (power failure or damage); "
             "a sweep computes them again, or take a copy of the file and of its log"
         )
-        warnings.warn(told, MultiPhiWarning, stacklevel=4)
+        warnings.warn(message, MultiPhiWarning, stacklevel=4)
 
 
 def _unusable(path: Path, cause: str) -> MultiPhiValueError:
@@ -231,7 +231,7 @@ def _opened(path: Path) -> sqlite3.Connection:
                 versions = ", ".join(str(version) for (version,) in found)
                 raise _unusable(path, f"has format {versions or 'none'}, this version reads {FORMAT}")
             _check(connection)
-            _tell_lost(path, log, connection)
+            _warn_lost(path, log, connection)
         except BaseException:
             connection.close()
             raise

@@ -91,7 +91,7 @@ def _submitted(executor: Executor, run: Callable[[str], Finished], case: Mapping
 
 @dataclass
 class _Flight:
-    """Cases on their way: submitted and not yet stored. ``count``: called for each case that is there."""
+    """Cases submitted and not yet stored. ``count``: called for each stored case."""
 
     submit: Callable[[Mapping[str, Any]], Future[Finished]]
     store: Store
@@ -141,16 +141,16 @@ class _Flight:
         self.count()
 
     def _clear_suspects(self) -> None:
-        """Find out which of the cases in flight took its worker with it."""
+        """Find the case in flight that ended its worker."""
         if not self.suspects:
             return
         while self.running:
             self._land()
-        found, self.suspects = self.suspects, []
-        for case in found:
-            self._alone(case)
+        suspects, self.suspects = self.suspects, []
+        for case in suspects:
+            self._run_alone(case)
 
-    def _alone(self, case: Mapping[str, Any]) -> None:
+    def _run_alone(self, case: Mapping[str, Any]) -> None:
         """Run a case with no other beside it: if its worker dies again, it is the cause."""
         started = time.perf_counter()
         self._start(case)
@@ -162,7 +162,7 @@ class _Flight:
             self._keep(case, ended(case, died, time.perf_counter() - started))
 
     def _salvage(self) -> None:
-        """Store what has finished of the cases in flight, and call the others off."""
+        """Store the finished cases in flight, and cancel the others."""
         for future, case in self.running.items():
             if future.done() and not future.cancelled() and future.exception() is None:
                 self._keep(case, *future.result())
