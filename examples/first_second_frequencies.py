@@ -25,7 +25,7 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.study.accuracy.cases import load_study
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.workbench import Workbench, prepare
+from multiphi_exudyn.study.scene.workbench import Setup, prepare
 
 STUDIES = {  # and what their values are
     "clamp": "rotation [N m/rad]",
@@ -47,9 +47,9 @@ def rates(time: np.ndarray, tip: np.ndarray) -> np.ndarray:
     return np.array([np.average(1 / (end - begin), weights=share) for share in shares])
 
 
-def natural(bench: Workbench) -> tuple[float, float]:
+def natural(setup: Setup) -> tuple[float, float]:
     """First natural frequency [Hz] of the open level, and the limit of large motion."""
-    model = mp.MultiPhiModel(bench.structure, bench.mechanics.contacts, modes=2)
+    model = mp.MultiPhiModel(setup.structure, setup.mechanics.contacts, modes=2)
     free, closed = (float(model.level(names).frequencies[0]) for names in ((), ("support",)))
     return free, 2 * free * closed / (free + closed)
 
@@ -60,9 +60,9 @@ def shown(name: str, quick: bool) -> dict[Any, tuple[float, float, np.ndarray]]:
     for at in study.points:
         case = study.reference(at)
         scene = study.scene_for(case)
-        bench = prepare(scene, mechanics_of(scene))
-        run = run_model(bench, study.model_name(case), progress=False)
-        free, limit = natural(bench)
+        setup = prepare(scene, mechanics_of(scene))
+        run = run_model(setup, study.model_name(case), progress=False)
+        free, limit = natural(setup)
         (value,) = at.values()
         found[value] = free, limit / free - 1, rates(run.time, run.points["node3"]) / free - 1
         told = ", ".join(f"{100 * rise:+.1f}" for rise in found[value][2])

@@ -10,7 +10,7 @@ from tqdm import tqdm
 from multiphi_exudyn.cli.options import results_folder
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.files import write_whole
-from multiphi_exudyn.study.comparison.animation import gif, stage_of
+from multiphi_exudyn.study.comparison.animation import gif, prepare_animation
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.time.warnings.warning_groups import grouped
 
@@ -24,7 +24,7 @@ def run_animate(
 ) -> bool:
     """Run two models of a scene and write the GIF; return True if both ran, else False without a file."""
     scene = load_scene(source, t_end=t_end)
-    stage = stage_of(scene, model, reference, slow)
+    stage = prepare_animation(scene, model, reference, slow)
     file = _file(out or Path(f"multiphi-{scene.name}") / "animation.gif")
     runs = stage.runs(progress=sys.stderr.isatty())
     failed = {name: run.message for name, run in runs.items() if not run.ok}

@@ -24,9 +24,9 @@ __all__ = ["run_budget"]
 def run_budget(source: str, t_end: float | None, modes: int | None, out: Path | None) -> bool:
     """Run all models of a scene's error budget and write budget.json and budget.png; return True if none failed."""
     scene = load_scene(source, t_end=t_end, modes=modes)
-    bench = prepare(scene, mechanics_of(scene))
+    setup = prepare(scene, mechanics_of(scene))
     folder = results_folder(out or Path(f"multiphi-{scene.name}"))
-    values = budget(bench, scene.file.modes, progress=sys.stderr.isatty()).values()
+    values = budget(setup, scene.file.modes, progress=sys.stderr.isatty()).values()
     write_whole(folder / "budget.json", json.dumps(values, indent=1).encode())
     write_whole(folder / "budget.png", png(budget_figure([values])))
     _print_summary(values)

@@ -30,7 +30,7 @@ __all__ = ["run_compare"]
 def run_compare(source: str, t_end: float | None, modes: int | None, out: Path | None) -> bool:
     """Run every model of a scene and write report.html, summary.json and histories.npz; return True if all ran."""
     scene = load_scene(source, t_end=t_end, modes=modes)
-    bench = prepare(scene, mechanics_of(scene))
+    setup = prepare(scene, mechanics_of(scene))
     folder = results_folder(out or Path(f"multiphi-{scene.name}"))
     with tqdm(total=len(scene.models) + 1, disable=None, unit="model") as bar:
 
@@ -39,7 +39,7 @@ def run_compare(source: str, t_end: float | None, modes: int | None, out: Path |
             bar.update(int(name != next(iter(scene.models))))
 
         where = environment() | {"import_s": import_times()}
-        comparison = compare(bench, where, progress=sys.stderr.isatty(), started=started)
+        comparison = compare(setup, where, progress=sys.stderr.isatty(), started=started)
         bar.update()
         bar.set_description("report")
         _write(comparison, folder)
@@ -53,7 +53,7 @@ def _write(comparison: Comparison, folder: Path) -> None:
     arrays = io.BytesIO()
     np.savez_compressed(arrays, allow_pickle=False, **dict[str, Any](histories(comparison)))
     content = json.dumps(summary(comparison), indent=1, allow_nan=False)
-    page = render(comparison, level_modes(comparison), loss_tables(comparison.bench))
+    page = render(comparison, level_modes(comparison), loss_tables(comparison.setup))
     write_whole(folder / "histories.npz", arrays.getvalue())
     write_whole(folder / "summary.json", content.encode())
     write_whole(folder / "report.html", page.encode())

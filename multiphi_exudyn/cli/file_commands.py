@@ -68,9 +68,9 @@ def _write_template(kind: str, path: Path) -> None:
 
 def _of_scene(source: str) -> str:
     scene = load_scene(source)
-    bench = prepare(scene, mechanics_of(scene))
-    contacts = ", ".join(contact.name for contact in bench.mechanics.contacts) or "none"
-    return f"a scene of {bench.structure.n} degrees of freedom; contacts: {contacts}; models: {', '.join(scene.models)}"
+    setup = prepare(scene, mechanics_of(scene))
+    contacts = ", ".join(contact.name for contact in setup.mechanics.contacts) or "none"
+    return f"a scene of {setup.structure.n} degrees of freedom; contacts: {contacts}; models: {', '.join(scene.models)}"
 
 
 def _of_study(study: Study) -> str:

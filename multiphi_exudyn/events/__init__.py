@@ -7,7 +7,7 @@ of a run: arrays documents their layout, and level_arrays fills them. Where each
     (38.3)  eta'' of a state              state_arrays.accelerate
     (38.6)  a state in another level      maps.move; its matrices transition.Transition
     1       armed                         phases.phase_of, monitoring.watch
-    1       requesting a change           monitoring.who_asks, decision.decide_jump
+    1       requesting a change           monitoring.collect_requests, decision.decide_jump
     2       rigid contacts that strike    striking.impact, impact.collide, striking.close_without_impact
     2       those at rest after it        resting.list_resting, resting.find_pressed, resting.drop_pulled
     2       redundant ones                redundancy.keep_independent
@@ -16,8 +16,8 @@ of a run: arrays documents their layout, and level_arrays fills them. Where each
     4       a compliant contact changes   switching.try_targets, switching.switch, phases.is_denied
     5       recovering                    phases.phase_of, monitoring.watch
     6       refused, and held back        phases.update_phases, phases.hold_back, monitoring.watch
-    6       repeated requests             monitoring.flag_again
-    7       a viscous contact             switching.is_relaxing
+    6       repeated requests             monitoring.flag_repeated_requests
+    7       a viscous contact             switching.would_pull_if_closed
     8       the segment of a force law    changes.set_requested_states, changes.segment_at
     8       and its changes               switching.is_unconditional, decision.is_return
     9       the sign of a signal          signals.row_sign, signals.rate_sign, phases.becomes

@@ -56,7 +56,7 @@ def build_base(
         lowest = _incomplete_base_modes(
             structure, krylov_rows, _sample_levels(stiffness, int(modes)), int(modes), previous
         )
-    aligned = lowest.modes.turned(points)
+    aligned = lowest.modes.aligned(points)
     return ModalBase(
         modes=aligned,
         points=points @ aligned.shapes,

@@ -160,7 +160,7 @@ def damping_matrix(structure: LinearStructure) -> Matrix | None:
             raise MultiPhiValueError(
                 "damping: got ModalDamping of sparse matrices where the damping matrix C is needed, need dense matrices"
             )
-        modes = complete_modes(structure.mass, structure.stiffness).turned(structure.point_rows)
+        modes = complete_modes(structure.mass, structure.stiffness).aligned(structure.point_rows)
         momenta = structure.mass @ modes.shapes
         return (momenta * (2 * damping.of(modes.count) * modes.omega)) @ momenta.T
     if isinstance(damping, RayleighDamping):

@@ -30,7 +30,7 @@ from multiphi_exudyn.events.transitions.state import State
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mechanics.element import friction_spring
 from multiphi_exudyn.mechanics.loads import Load
-from multiphi_exudyn.time.run.continuation import stops_moved
+from multiphi_exudyn.time.run.continuation import stop_displacements
 from multiphi_exudyn.time.simulate import Run
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
@@ -136,7 +136,7 @@ class Shooting:
         final, other = self._state, trajectory.final
         assert other is not None, "a run that is ok has a final state"
         level = final.level
-        held = other.held + (stops_moved(other) - stops_moved(final))[list(self.map.model.held)]
+        held = other.held + (stop_displacements(other) - stop_displacements(final))[list(self.map.model.held)]
         centre = np.concatenate([final.displacement[: len(final.displacement) - len(held)], held])
         y = other.level.configuration(other.displacement) - level.configuration(centre)
         v = other.level.motion(other.velocity) - level.motion(final.velocity)

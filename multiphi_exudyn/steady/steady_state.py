@@ -29,7 +29,7 @@ from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity, Static
 from multiphi_exudyn.steady.settled_state import PeriodicLoad, SteadyState, course_of, frequency
 from multiphi_exudyn.steady.settling import CHUNK, Search, with_warnings
 from multiphi_exudyn.steady.shooting import PeriodMap
-from multiphi_exudyn.time.simulate import Run, holding, outside_of, started
+from multiphi_exudyn.time.simulate import Run, base_warnings_of, holding, started
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from multiphi_exudyn.time.warnings.warning_groups import issue, kept_back
 
@@ -119,7 +119,7 @@ def settle_run(
     (displacement, velocity, start), loads, period = begin, (load, *other_loads), 1.0 / frequency(load)
     model = holding(model.decided or model, loads, start)
     run = started(Run(model, CHUNK * period, displacement, velocity, loads, start=start, rewound=True))
-    search = Search(PeriodMap(model, loads, period), load, tolerance, outside_of(run, model))
+    search = Search(PeriodMap(model, loads, period), load, tolerance, base_warnings_of(run, model))
     return search.settle(with_warnings(run.trajectory()), periods)
 
 

@@ -36,9 +36,9 @@ from multiphi_exudyn.time.warnings.warning_groups import issue
 __all__ = [
     "Run",
     "SharedResources",
+    "base_warnings_of",
     "checked_end",
     "holding",
-    "outside_of",
     "run_with_warnings",
     "simulate",
     "started",
@@ -135,14 +135,14 @@ def run_with_warnings(run: Run) -> Trajectory:
     """Trajectory of a run with its warnings, none of them issued."""
     modes, run = run.model.modes, started(run)
     trajectory = run.trajectory()
-    of_base = outside_of(run, trajectory.model)
+    of_base = base_warnings_of(run, trajectory.model)
     sentences = (*warnings_of(trajectory, modes if isinstance(modes, Tolerance) else None), *of_base)
     if sentences:
         object.__setattr__(trajectory, "warnings", sentences)  # it is new: no other reference to it exists
     return trajectory
 
 
-def outside_of(run: Run, model: MultiPhiModel, rows: Sequence[np.ndarray] = ()) -> tuple[str, ...]:
+def base_warnings_of(run: Run, model: MultiPhiModel, rows: Sequence[np.ndarray] = ()) -> tuple[str, ...]:
     """Sentences on what a base leaves out of a run and of further rows (k, n) on which forces act."""
     if model.base.complete:
         return ()

@@ -47,13 +47,13 @@ def test_a_rung_that_changes_nothing_is_left_out():
 
 
 def test_a_run_that_gains_energy_comes_out_right_at_gentler_settings(tmp_path, monkeypatch):
-    bench = bench_of(tmp_path, 1e7, STIFF)
-    once = run_model(bench, "full", progress=False)
+    setup = bench_of(tmp_path, 1e7, STIFF)
+    once = run_model(setup, "full", progress=False)
     assert once.status == "failed"
     assert "gentler" not in once.message
     tried = []
     monkeypatch.setattr(full_runner, "attempts", lambda *given: tried.append(attempts(*given)) or tried[-1])
-    run = run_model(bench, "full", progress=False, retry=True)
+    run = run_model(setup, "full", progress=False, retry=True)
     assert run.ok
     assert run.message.startswith("ran with gentler settings (full Newton")
     assert f"as asked: {once.message}" in run.message

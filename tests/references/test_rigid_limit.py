@@ -32,11 +32,11 @@ def difference(run, reference, until):
 
 
 def test_rigid_levels_of_the_rig_are_far_from_a_soft_stop_and_near_a_stiff_one():
-    bench = bench_of(1e6)
-    runs = {name: run_model(bench, name) for name in bench.scene.models}
-    stiff = stiff_stops(bench)
+    setup = bench_of(1e6)
+    runs = {name: run_model(setup, name) for name in setup.scene.models}
+    stiff = stiff_stops(setup)
     assert stiff.stiffness == pytest.approx([1e8, 1e9, 1e10])
-    assert stiff.uncertainty(bench.time, POINTS, 0.3) < 0.03
+    assert stiff.uncertainty(setup.time, POINTS, 0.3) < 0.03
     for name in ("rigid-6", "rigid-12", "rigid-24", "rigid-all"):
         assert difference(runs[name], runs["linear"], 0.3) > 0.1
         assert stiff.error(runs[name], POINTS, 0.3) < 0.03
@@ -46,8 +46,8 @@ def test_rigid_levels_of_the_rig_are_far_from_a_soft_stop_and_near_a_stiff_one()
 @pytest.mark.slow
 def test_on_a_stop_of_1e7_the_full_beam_confirms_them():
     """Its own step still changes it by 1 % to 0.3 s; to 0.1 s, by 0.1 %."""
-    bench = bench_of(1e7, {"kind": "full", "name": "full", "elements": 20, "step": 5e-6})
-    runs = {name: run_model(bench, name, progress=False) for name in ("linear", "rigid-6", "rigid-12", "full")}
+    setup = bench_of(1e7, {"kind": "full", "name": "full", "elements": 20, "step": 5e-6})
+    runs = {name: run_model(setup, name, progress=False) for name in ("linear", "rigid-6", "rigid-12", "full")}
     assert difference(runs["linear"], runs["full"], 0.1) < 0.001
     assert difference(runs["linear"], runs["full"], 0.3) < 0.02
     for name in ("rigid-6", "rigid-12"):

@@ -18,7 +18,7 @@ from multiphi_exudyn.study.comparison.animation import (
     _closed,
     gif,
     moving_figure,
-    stage_of,
+    prepare_animation,
 )
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
@@ -58,7 +58,7 @@ def refused(capsys, *arguments):
 
 def drawn(path, frame, **chosen):
     """The animated scene, both runs, and the axes of one frame."""
-    animated = stage_of(load_scene(path), **chosen)
+    animated = prepare_animation(load_scene(path), **chosen)
     runs = animated.runs(progress=False)
     figure, move = moving_figure(animated, runs)
     move(frame)
@@ -68,9 +68,9 @@ def drawn(path, frame, **chosen):
 def test_points_at_every_node_leave_both_models_as_they_are(scene):
     animated, runs, (axes, _) = drawn(scene, 7, slow=20.0)
     loaded = load_scene(scene)
-    bench = prepare(loaded, mechanics_of(loaded))
+    setup = prepare(loaded, mechanics_of(loaded))
     for name, run in runs.items():
-        alone = run_model(bench, name, progress=False)
+        alone = run_model(setup, name, progress=False)
         assert np.max(np.abs(run.points["tip"] - alone.points["tip"])) < SAME
         line = next(each for each in axes.lines if each.get_label() == name)
         now = np.interp(animated.time[7], alone.time, alone.points["tip"])
@@ -82,10 +82,10 @@ def test_points_at_every_node_leave_both_models_as_they_are(scene):
 def test_the_shape_between_the_points_is_the_trajectory_of_the_linear_elements(tmp_path):
     animated, _, (axes, _) = drawn(write(tmp_path / "linear.toml", PLAIN), 4, slow=5.0)
     loaded = load_scene(str(tmp_path / "linear.toml"))
-    bench = prepare(loaded, mechanics_of(loaded))
-    model = mp.MultiPhiModel(bench.structure, bench.mechanics.contacts)
+    setup = prepare(loaded, mechanics_of(loaded))
+    model = mp.MultiPhiModel(setup.structure, setup.mechanics.contacts)
     start = model.static_equilibrium({"tip": 1.0})
-    trajectory = mp.simulate(model, 0.1, displacement=start * 0.01 / (bench.structure.row("tip") @ start))
+    trajectory = mp.simulate(model, 0.1, displacement=start * 0.01 / (setup.structure.row("tip") @ start))
     expected = trajectory.displacement(animated.time[4])[::2]
     assert axes.lines[0].get_ydata()[1:] == pytest.approx(1e3 * expected, abs=1e-4)
 
@@ -128,7 +128,7 @@ def test_beams_that_meet_are_each_shown_with_the_other_where_it_would_touch(tmp_
 
 
 def test_the_gif_has_every_frame_and_its_rate(scene):
-    animated = stage_of(load_scene(scene), slow=4.0)
+    animated = prepare_animation(load_scene(scene), slow=4.0)
     drawn_frames = []
     content = gif(animated, animated.runs(progress=False), lambda: drawn_frames.append(1))
     with Image.open(io.BytesIO(content)) as written:
@@ -146,8 +146,8 @@ def test_animate_writes_one_file_and_says_where(scene, tmp_path, capsys):
 
 
 def test_without_a_factor_a_period_is_shown_at_length_in_a_film_that_ends(scene):
-    short, long = (stage_of(load_scene(scene, t_end=t_end)) for t_end in (0.1, 10.0))
-    assert short.slow * short.bench.longest_period == pytest.approx(PERIOD_SHOWN, rel=0.1)
+    short, long = (prepare_animation(load_scene(scene, t_end=t_end)) for t_end in (0.1, 10.0))
+    assert short.slow * short.setup.longest_period == pytest.approx(PERIOD_SHOWN, rel=0.1)
     assert long.slow * 10.0 == pytest.approx(LONGEST, rel=0.1)
 
 
@@ -161,7 +161,7 @@ def test_a_model_that_fails_is_exit_code_1_with_its_cause_and_no_file(scene, tmp
 
 def _failing(animated):
     """Both runs, the full one not tried again at gentler settings."""
-    return {name: run_model(animated.bench, name, progress=False) for name in animated.models}
+    return {name: run_model(animated.setup, name, progress=False) for name in animated.models}
 
 
 @pytest.mark.parametrize(

@@ -114,11 +114,11 @@ class TestScenes:
     @pytest.mark.parametrize(("name", "t_end"), [("two-sided-stop", 0.03), ("clapping-cantilevers", 0.03)])
     def test_reduced_and_full_agree_through_the_first_contacts(self, name, t_end):
         scene = load_scene(name, t_end=t_end)
-        bench = prepare(scene, mechanics_of(scene))
+        setup = prepare(scene, mechanics_of(scene))
         first = next(name for name, spec in scene.models.items() if spec.kind == "reduced")
-        reduced, full = (run_model(bench, name, progress=False) for name in (first, "full-cheapest"))
+        reduced, full = (run_model(setup, name, progress=False) for name in (first, "full-cheapest"))
         assert sum(len(given) for given in full.contact_intervals.values()) >= 1
-        for point in bench.judged_points:
+        for point in setup.judged_points:
             difference = np.linalg.norm(reduced.points[point] - full.points[point])
             assert difference < 0.02 * np.linalg.norm(full.points[point])
 
@@ -132,9 +132,9 @@ class TestScenes:
             start={"load_at": "a.tip", "measured_at": "b.tip", "displacement": 0.01},
             outputs={"t_end": 0.1, "points": ["a.tip"], "interval": 1e-3},
         )
-        bench = prepare(scene, mechanics_of(scene))
-        parts = {name: planar_beam(bench.mechanics.beams.parts[name], 57) for name in ("a", "b")}
-        np.testing.assert_allclose(frequencies(bench.structure), frequencies(mp.assemble(parts, ties)), rtol=1e-9)
+        setup = prepare(scene, mechanics_of(scene))
+        parts = {name: planar_beam(setup.mechanics.beams.parts[name], 57) for name in ("a", "b")}
+        np.testing.assert_allclose(frequencies(setup.structure), frequencies(mp.assemble(parts, ties)), rtol=1e-9)
 
     def test_a_row_is_its_points_and_contacts_one_by_one(self, tmp_path):
         rows, single = copy.deepcopy(BEAM), copy.deepcopy(BEAM)

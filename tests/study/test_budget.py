@@ -176,18 +176,18 @@ def test_the_full_beams_working_step_is_the_coarser_copys_and_is_halved_at_least
 def body_with_a_wrong_contact(original):
     """Runners in which the rigid Multi-Phi rung meets its stop elsewhere: a quarter further away."""
 
-    def run(bench, name, progress):
+    def run(setup, name, progress):
         if name == "multiphi-rigid":
-            moved = tuple(replace(each, gap=1.25 * each.gap) for each in bench.mechanics.contacts)
-            bench = replace(bench, mechanics=replace(bench.mechanics, contacts=moved))
-        return original(bench, name, progress)
+            moved = tuple(replace(each, gap=1.25 * each.gap) for each in setup.mechanics.contacts)
+            setup = replace(setup, mechanics=replace(setup.mechanics, contacts=moved))
+        return original(setup, name, progress)
 
     return run
 
 
 def test_a_rung_made_wrong_shows_in_its_own_parts(small, monkeypatch):
     monkeypatch.setattr(ladder, "run_model", body_with_a_wrong_contact(ladder.run_model))
-    wrong = budget(small.bench, modes=3, progress=False).values()["windows"]["0.05"]
+    wrong = budget(small.setup, modes=3, progress=False).values()["windows"]["0.05"]
     right = small.values()["windows"]["0.05"]
     for cause in (STEPS, GEOMETRY, CONTACT):
         assert part(wrong["rigid"]["all"], cause)["size"] == part(right["rigid"]["all"], cause)["size"]
@@ -199,9 +199,9 @@ def test_a_rung_made_wrong_shows_in_its_own_parts(small, monkeypatch):
 def test_a_full_beam_that_fails_is_missing_with_its_cause(tmp_path, monkeypatch):
     original = ladder.run_model
 
-    def run(bench, name, progress):
+    def run(setup, name, progress):
         failed = ModelRun(name, "full", name, status="failed", message="Newton failed at 0.01 s")
-        return failed if bench.scene.models[name].kind == "full" else original(bench, name, progress)
+        return failed if setup.scene.models[name].kind == "full" else original(setup, name, progress)
 
     monkeypatch.setattr(ladder, "run_model", run)
     values = budget(bench_of(tmp_path), modes=3, progress=False).values()
@@ -215,8 +215,8 @@ def test_a_full_beam_that_fails_is_missing_with_its_cause(tmp_path, monkeypatch)
 
 def test_a_scene_without_a_full_beam_starts_at_the_linear_one(tmp_path):
     only = {"models": [{"kind": "reduced", "name": "all", "modes": "all"}], "comparison": {"reference": "all"}}
-    bench = bench_of(tmp_path, **only, outputs={"t_end": 0.01, "interval": 1e-3})
-    values = budget(bench, modes=3, progress=False).values()
+    setup = bench_of(tmp_path, **only, outputs={"t_end": 0.01, "interval": 1e-3})
+    values = budget(setup, modes=3, progress=False).values()
     assert values["rungs"]["full-converged"]["message"] == "the scene has no full beam"
     assert len(values["windows"]["0.01"]["compliant"]["all"]["parts"]) == 2
 
@@ -233,7 +233,7 @@ def test_a_scene_without_a_full_beam_starts_at_the_linear_one(tmp_path):
     ],
 )
 def test_bad_arguments_are_refused(small, refused, kind, begins, given):
-    refused(kind, begins, budget, small.bench, **given)
+    refused(kind, begins, budget, small.setup, **given)
 
 
 def test_levels_with_printed_frequencies_have_no_budget(refused):

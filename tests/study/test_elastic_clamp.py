@@ -112,12 +112,12 @@ def bench_of(folder, **structure):
 
 
 def test_all_models_of_a_scene_stand_on_its_clamp(tmp_path):
-    bench = bench_of(tmp_path)
-    full, everything, body = (run_model(bench, name, progress=False) for name in ("full", "all", "body"))
+    setup = bench_of(tmp_path)
+    full, everything, body = (run_model(setup, name, progress=False) for name in ("full", "all", "body"))
     rigid = run_model(bench_of(tmp_path, clamp_translation="rigid", clamp_rotation="rigid"), "all", progress=False)
     assert full.ok
     assert len(full.contact_intervals["support"])
-    for point in bench.judged_points:
+    for point in setup.judged_points:
         assert nrmse(everything.points[point], full.points[point], full.time, 0.12) < ONE_STEP
         assert nrmse(body.points[point], everything.points[point], full.time, 0.12) < ONE_STEP
         assert nrmse(rigid.points[point], full.points[point], full.time, 0.12) > 1000 * ONE_STEP

@@ -25,29 +25,29 @@ RELATIVE = ("nrmse", "max_difference", "spectral_difference", "horizon")
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory):
+def setup(tmp_path_factory):
     outputs = {"t_end": 0.2, "points": ["middle", "tip"], "judged_points": ["tip"], "interval": 1e-4}
     scene = load_scene(write(tmp_path_factory.mktemp("scene") / "small.toml", changed(["outputs"], outputs)))
     return prepare(scene, mechanics_of(scene))
 
 
 @pytest.fixture(scope="module")
-def reference(bench):
+def reference(setup):
     """Drawn by hand: in contact twice."""
-    tip = 1e-2 * np.cos(300 * bench.time)
+    tip = 1e-2 * np.cos(300 * setup.time)
     return ModelRun(
         "drawn",
         "full",
         "drawn by hand",
         dofs=40,
-        time=bench.time,
+        time=setup.time,
         points={"tip": tip, "middle": 0.4 * tip},
         gaps={"stop": 1e-3 + 0.4 * tip},
         contact_force={"stop": np.maximum(0, -tip)},
         contact_intervals={"stop": np.array([[0.03, 0.032], [0.034, 0.04]])},
         impulse={"stop": 0.5},
-        energy_time=bench.time,
-        energy=np.exp(-bench.time),
+        energy_time=setup.time,
+        energy=np.exp(-setup.time),
         ledger={"initial": 1.0, "damping": 0.2, "final": 0.8},
         steps=100,
         repeats_s=(0.1, 0.2),
@@ -55,19 +55,19 @@ def reference(bench):
 
 
 @pytest.fixture(scope="module")
-def simulated(bench):
-    return run_model(bench, "r6")
+def simulated(setup):
+    return run_model(setup, "r6")
 
 
 def scaled(run, share):
     return replace(run, points={name: (1 + share) * values for name, values in run.points.items()})
 
 
-def test_the_measures_are_these_and_nothing_else(bench, reference):
-    assert list(measures(bench, reference, reference)) == KEYS
+def test_the_measures_are_these_and_nothing_else(setup, reference):
+    assert list(measures(setup, reference, reference)) == KEYS
 
 
-def test_every_measure_is_defined(bench, reference):
+def test_every_measure_is_defined(setup, reference):
     assert set(KEYS) - {"label", "kind"} <= set(metrics.METRICS)
     assert set(metrics.METRICS) - set(KEYS) == {
         "pointwise_until",
@@ -75,8 +75,8 @@ def test_every_measure_is_defined(bench, reference):
     }  # of two runs, of a study
 
 
-def test_differences_to_the_reference_by_window_and_point(bench, reference):
-    found = measures(bench, scaled(reference, 0.03), reference)
+def test_differences_to_the_reference_by_window_and_point(setup, reference):
+    found = measures(setup, scaled(reference, 0.03), reference)
     for name in ("nrmse", "spectral_difference"):
         assert list(found[name]) == ["0.1", "0.2"]
         for table in found[name].values():
@@ -85,13 +85,13 @@ def test_differences_to_the_reference_by_window_and_point(bench, reference):
     assert found["horizon"] == {"0.01": 0.0, "0.05": 0.2}
 
 
-def test_the_horizon_is_that_of_the_judged_points(bench, reference):
+def test_the_horizon_is_that_of_the_judged_points(setup, reference):
     off = replace(reference, points=dict(reference.points) | {"middle": 2 * reference.points["middle"]})
-    assert horizons(bench, off, reference) == {"0.01": 0.2, "0.05": 0.2}
+    assert horizons(setup, off, reference) == {"0.01": 0.2, "0.05": 0.2}
 
 
-def test_contacts_energy_and_ledger(bench, reference):
-    found = measures(bench, reference, None)
+def test_contacts_energy_and_ledger(setup, reference):
+    found = measures(setup, reference, None)
     assert found["first_contact"] == {"stop": 0.03}
     assert found["contact_count"] == {"stop": 2}
     assert found["closed_time"] == {"stop": pytest.approx(0.008)}
@@ -105,17 +105,17 @@ def test_contacts_energy_and_ledger(bench, reference):
     assert (found["label"], found["kind"], found["dofs"], found["steps"]) == ("drawn by hand", "full", 40, 100)
 
 
-def test_without_a_reference_there_are_no_differences(bench, reference):
+def test_without_a_reference_there_are_no_differences(setup, reference):
     failed = ModelRun("full", "full", "full", status="failed", message="no convergence")
     for missing in (None, failed):
-        found = measures(bench, reference, missing)
+        found = measures(setup, reference, missing)
         assert [found[name] for name in RELATIVE] == [{}] * 4
         assert list(found) == KEYS
 
 
-def test_a_failed_run_has_its_label_and_no_numbers(bench, reference):
+def test_a_failed_run_has_its_label_and_no_numbers(setup, reference):
     failed = ModelRun("full", "full", "full beam", status="failed", message="no convergence")
-    found = measures(bench, failed, reference)
+    found = measures(setup, failed, reference)
     assert list(found) == KEYS
     assert found["label"] == "full beam"
     assert found["energy_end"] is None
@@ -123,29 +123,29 @@ def test_a_failed_run_has_its_label_and_no_numbers(bench, reference):
     assert all(found[name] == {} for name in KEYS[4:] if name not in ("energy_end", "warnings"))
 
 
-def test_a_run_that_never_touches_has_no_first_contact(bench, reference):
-    found = measures(bench, replace(reference, contact_intervals={"stop": np.zeros((0, 2))}), None)
+def test_a_run_that_never_touches_has_no_first_contact(setup, reference):
+    found = measures(setup, replace(reference, contact_intervals={"stop": np.zeros((0, 2))}), None)
     assert found["first_contact"] == {"stop": None}
     assert found["intervals"] == {"stop": []}
     assert found["contact_count"] == {"stop": 0} == found["inner_losses"]
 
 
-def test_measures_are_json_without_numbers_that_do_not_exist(bench, reference, simulated):
+def test_measures_are_json_without_numbers_that_do_not_exist(setup, reference, simulated):
     still = scaled(reference, -1.0)
     for run, other in ((simulated, reference), (reference, still), (still, reference)):
-        found = measures(bench, run, other)
+        found = measures(setup, run, other)
         assert json.loads(json.dumps(found, allow_nan=False)) == found
-    assert measures(bench, reference, still)["nrmse"]["0.1"]["tip"] is None
+    assert measures(setup, reference, still)["nrmse"]["0.1"]["tip"] is None
 
 
-def test_windows_end_with_the_run(bench):
+def test_windows_end_with_the_run(setup):
     def of(t_end):
-        return replace(bench, time=1e-3 * np.arange(round(t_end / 1e-3) + 1)).windows
+        return replace(setup, time=1e-3 * np.arange(round(t_end / 1e-3) + 1)).windows
 
     assert [of(t_end) for t_end in (0.05, 0.3, 1.0)] == [(0.05,), (0.1, 0.3), (0.1, 0.3, 1.0)]
 
 
-def test_a_run_stored_as_arrays_is_the_same_run(bench, reference, simulated, tmp_path):
+def test_a_run_stored_as_arrays_is_the_same_run(setup, reference, simulated, tmp_path):
     for run in (reference, simulated, ModelRun("a", "full", "label, of a", status="failed", message="why: n/a")):
         np.savez(tmp_path / "run.npz", **to_arrays(run))
         with np.load(tmp_path / "run.npz", allow_pickle=False) as stored:
@@ -153,7 +153,7 @@ def test_a_run_stored_as_arrays_is_the_same_run(bench, reference, simulated, tmp
         np.testing.assert_equal(vars(restored), vars(run))
         assert type(restored.steps) is int
         assert type(restored.message) is str
-        assert measures(bench, restored, reference) == measures(bench, run, reference)
+        assert measures(setup, restored, reference) == measures(setup, run, reference)
 
 
 def test_arrays_are_named_by_field_and_entry(reference):

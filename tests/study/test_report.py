@@ -39,39 +39,39 @@ ENVIRONMENT = {"python": "3", "versions": {"numpy": "2"}, "import_s": {"exudyn":
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory):
+def setup(tmp_path_factory):
     data = changed(["outputs", "points"], ["middle", "tip"]) | {"models": MODELS, "comparison": PARTS}
     scene = load_scene(write(tmp_path_factory.mktemp("scene") / "small.toml", data))
     return prepare(scene, mechanics_of(scene))
 
 
 @pytest.fixture(scope="module")
-def comparison(bench):
+def comparison(setup):
     """Runs drawn by hand: every model is off by a known share, and takes a known time."""
-    shares = dict(zip(bench.scene.models, (0.02, 0.2, 0.03, 0.0, 0.01, 0.04), strict=True))
-    times_s = dict(zip(bench.scene.models, (0.01, 0.01, 0.1, 10.0, 5.0, 1.0), strict=True))
-    runs = {name: drawn(bench, name, share, times_s[name]) for name, share in shares.items()}
+    shares = dict(zip(setup.scene.models, (0.02, 0.2, 0.03, 0.0, 0.01, 0.04), strict=True))
+    times_s = dict(zip(setup.scene.models, (0.01, 0.01, 0.1, 10.0, 5.0, 1.0), strict=True))
+    runs = {name: drawn(setup, name, share, times_s[name]) for name, share in shares.items()}
     stiff = [
         {name: factor * values for name, values in runs["rigid-r6"].points.items()} for factor in (1.03, 1.02, 1.01)
     ]
-    return Comparison(bench, runs, ENVIRONMENT, StiffStops((1e8, 1e9, 1e10), tuple(stiff)))
+    return Comparison(setup, runs, ENVIRONMENT, StiffStops((1e8, 1e9, 1e10), tuple(stiff)))
 
 
-def drawn(bench, name, share, online_s):
-    tip = 1e-2 * np.cos(60 * bench.time)
+def drawn(setup, name, share, online_s):
+    tip = 1e-2 * np.cos(60 * setup.time)
     return ModelRun(
         name,
-        bench.scene.models[name].kind,
+        setup.scene.models[name].kind,
         f"model {name}, {'rigid' if name.startswith('rigid') else 'compliant'} levels",
         dofs=6,
-        time=bench.time,
+        time=setup.time,
         points={"tip": (1 + share) * tip, "middle": (1 + share / 2) * tip},
         gaps={"stop": 1e-3 + tip},
         contact_force={"stop": np.maximum(0, -tip)},
         contact_intervals={"stop": np.array([[0.03, 0.032], [0.034, 0.04]])},
         impulse={"stop": 0.5},
-        energy_time=bench.time,
-        energy=np.exp(-bench.time),
+        energy_time=setup.time,
+        energy=np.exp(-setup.time),
         ledger={"initial": 1.0, "damping": 0.1, "final": 0.9, "residual": 0.0},
         steps=100,
         first_s=2 * online_s,
@@ -82,7 +82,7 @@ def drawn(bench, name, share, online_s):
 @pytest.fixture(scope="module")
 def page(comparison, pictures):
     with pictures():
-        return render(comparison, level_modes(comparison), loss_tables(comparison.bench))
+        return render(comparison, level_modes(comparison), loss_tables(comparison.setup))
 
 
 def text_of(page):
@@ -139,7 +139,7 @@ def test_the_page_has_the_samples_of_its_histories_and_names_cannot_end_their_el
     line = next(each for each in data[1]["lines"] if each["name"] == "compliant-r6")
     values = np.frombuffer(base64.b64decode(line["data"]), dtype="<f4")
     assert values == pytest.approx(1e3 * comparison.runs["compliant-r6"].points["tip"], rel=1e-6)
-    assert data[1]["x"]["start"] + data[1]["x"]["step"] * (len(values) - 1) == pytest.approx(comparison.bench.t_end)
+    assert data[1]["x"]["start"] + data[1]["x"]["step"] * (len(values) - 1) == pytest.approx(comparison.setup.t_end)
     assert data[2]["shade"] == [[0.03, 0.032], [0.034, 0.04]]
     assert "<" not in embedded({"name": "</script>"})
     assert json.loads(embedded({"name": "</script>"})) == {"name": "</script>"}
@@ -202,9 +202,9 @@ def test_a_stiff_stop_that_failed_is_told_with_its_cause(comparison):
 def test_windows_end_with_the_run_and_the_headline_takes_the_longest_that_fits(comparison):
     def with_end(t_end):
         time = 1e-3 * np.arange(round(t_end / 1e-3) + 1)
-        return replace(comparison, bench=replace(comparison.bench, time=time))
+        return replace(comparison, setup=replace(comparison.setup, time=time))
 
-    assert [with_end(t_end).bench.windows for t_end in (0.05, 0.3, 1.0)] == [(0.05,), (0.1, 0.3), (0.1, 0.3, 1.0)]
+    assert [with_end(t_end).setup.windows for t_end in (0.05, 0.3, 1.0)] == [(0.05,), (0.1, 0.3), (0.1, 0.3, 1.0)]
     assert [with_end(t_end).headline_window for t_end in (0.05, 0.3, 1.0)] == [0.05, 0.3, 0.3]
 
 
@@ -259,16 +259,16 @@ def test_a_scene_of_matrices_is_compared_without_shapes(tmp_path):
     compared = compare(prepare(scene, mechanics_of(scene)), {}, progress=False)
     assert [run.status for run in compared.runs.values()] == ["ok", "ok"]
     assert level_modes(compared) == ()
-    assert "A static force of +1 N at tip" in text_of(render(compared, (), loss_tables(compared.bench)))
+    assert "A static force of +1 N at tip" in text_of(render(compared, (), loss_tables(compared.setup)))
 
 
-def test_modes_along_the_beam_have_the_frequencies_of_the_runs(bench, comparison):
+def test_modes_along_the_beam_have_the_frequencies_of_the_runs(setup, comparison):
     free, closed = level_modes(comparison)
-    assert free.frequencies[0] == pytest.approx(1 / bench.longest_period)
+    assert free.frequencies[0] == pytest.approx(1 / setup.longest_period)
     assert np.all(np.diff(np.ravel(np.column_stack([free.frequencies, closed.frequencies]))) >= 0)
-    own = mp.MultiPhiModel(bench.structure, bench.mechanics.contacts, modes=4).level(("stop",))
+    own = mp.MultiPhiModel(setup.structure, setup.mechanics.contacts, modes=4).level(("stop",))
     assert closed.frequencies == pytest.approx(own.frequencies)
-    row = bench.structure.row("middle") @ own.shapes / np.max(np.abs(bench.structure.row("tip") @ own.shapes[:, 0]))
+    row = setup.structure.row("middle") @ own.shapes / np.max(np.abs(setup.structure.row("tip") @ own.shapes[:, 0]))
     (beam,) = closed.beams
     assert abs(np.interp(0.3, beam.x, beam.shapes[0])) == pytest.approx(abs(row[0]), rel=1e-2)
     assert beam.contacts == (0.3,)
@@ -313,7 +313,7 @@ def test_many_contacts_are_told_of_together(tmp_path):
     data = changed(["outputs"], {"t_end": 0.1, "points": ["tip"], "interval": 1e-3}, data)
     scene = load_scene(write(tmp_path / "bed.toml", data))
     compared = compare(prepare(scene, mechanics_of(scene)), {}, progress=False)
-    page = render(compared, level_modes(compared), loss_tables(compared.bench))
+    page = render(compared, level_modes(compared), loss_tables(compared.setup))
     assert page.count("data:image/png") == 1 + 1 + 1 + 1 + 1
     assert "meets 6 contacts from s1 to s6 (gap 1 mm, 10 kN/m each)" in text_of(page)
     totals = contact_totals(compared).loc[compared.reference.name]

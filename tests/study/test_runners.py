@@ -46,13 +46,13 @@ def bench_of(folder, **fields):
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory):
+def setup(tmp_path_factory):
     return bench_of(tmp_path_factory.mktemp("scene"))
 
 
 @pytest.fixture(scope="module")
-def runs(bench):
-    return {name: run_model(bench, name, progress=False) for name in bench.scene.models}
+def runs(setup):
+    return {name: run_model(setup, name, progress=False) for name in setup.scene.models}
 
 
 def difference(runs, one, other, until=0.12):
@@ -74,8 +74,8 @@ def test_full_and_linear_model_share_start_matrices_and_damping(tmp_path):
     errors = []
     for displacement in (1e-3, 1e-4):
         start = {"load_at": "tip", "measured_at": "tip", "displacement": displacement}
-        bench = bench_of(tmp_path, start=start)
-        runs = {name: run_model(bench, name, progress=False) for name in ("full", "all")}
+        setup = bench_of(tmp_path, start=start)
+        runs = {name: run_model(setup, name, progress=False) for name in ("full", "all")}
         assert len(runs["full"].contact_intervals["stop"]) == 0
         errors.append(difference(runs, "all", "full"))
     assert errors[0] < 2e-4
@@ -117,7 +117,7 @@ def test_the_baselines_meet_the_stop_when_the_models_they_replace_do(runs, one, 
     np.testing.assert_allclose(energy, runs[other].energy, rtol=2e-3, atol=1e-3 * energy[0])
 
 
-def test_labels_say_what_a_model_is(bench, runs):
+def test_labels_say_what_a_model_is(setup, runs):
     assert runs["component"].label == "Craig-Bampton in Exudyn, 2 interface points + 12 modes, step 10 µs"
     assert runs["stepwise"].label == "solve_ivp, DOP853, rtol 1e-09, compliant levels, r = 6"
     assert runs["one-rigid-basis"].label == "global basis, rigid levels, r = 8 from each of two"
@@ -127,9 +127,9 @@ def test_a_component_loaded_inside_starts_from_a_projection_and_says_so(tmp_path
     outputs = {"t_end": 0.01, "interval": 1e-4, "points": ["middle"]}
     component = {"kind": "craig-bampton", "name": "component", "modes": 3, "step": 1e-4}
     models = [{"kind": "reduced", "name": "all", "modes": "all"}, component]
-    bench = bench_of(tmp_path, outputs=outputs, models=models, comparison={"reference": "all"})
-    assert bench.interface == ("middle",)
-    projected, exact = (run_model(bench, name, progress=False) for name in ("component", "all"))
+    setup = bench_of(tmp_path, outputs=outputs, models=models, comparison={"reference": "all"})
+    assert setup.interface == ("middle",)
+    projected, exact = (run_model(setup, name, progress=False) for name in ("component", "all"))
     assert projected.label.endswith(", start projected")
     assert projected.ledger["truncation_strain"] > 0
     assert projected.points["middle"][0] == pytest.approx(exact.points["middle"][0], rel=1e-9)
@@ -146,8 +146,8 @@ def test_a_component_loaded_inside_starts_from_a_projection_and_says_so(tmp_path
 )
 def test_a_baseline_that_gains_energy_has_failed(tmp_path, model):
     models = [{"kind": "reduced", "name": "all", "modes": "all"}, model | {"name": "coarse"}]
-    bench = bench_of(tmp_path, models=models, comparison={"reference": "all"}, damping={"modal_ratios": []})
-    run = run_model(bench, "coarse", progress=False)
+    setup = bench_of(tmp_path, models=models, comparison={"reference": "all"}, damping={"modal_ratios": []})
+    run = run_model(setup, "coarse", progress=False)
     assert run.status == "failed"
     assert "energy gained" in run.message
     assert run.online_s > 0
@@ -169,21 +169,21 @@ def test_rigid_levels_have_another_contact_law(runs):
 @pytest.mark.parametrize("displacement", [0.01, -0.01])
 def test_the_start_reaches_its_displacement_with_the_right_contacts_closed(tmp_path, displacement):
     start = {"load_at": "tip", "measured_at": "tip", "displacement": displacement}
-    bench = bench_of(tmp_path, start=start)
+    setup = bench_of(tmp_path, start=start)
     for rigid in (False, True):
-        model = MultiPhiModel(bench.structure, bench.contacts(rigid))
-        x = start_configuration(bench, model)
-        gap = bench.structure.row("middle") @ x + 1e-3
-        assert bench.structure.row("tip") @ x == pytest.approx(displacement, rel=1e-9)
+        model = MultiPhiModel(setup.structure, setup.contacts(rigid))
+        x = start_configuration(setup, model)
+        gap = setup.structure.row("middle") @ x + 1e-3
+        assert setup.structure.row("tip") @ x == pytest.approx(displacement, rel=1e-9)
         assert gap > 1e-3 if displacement > 0 else gap <= 1e-12
 
 
 def test_a_start_by_force_is_the_static_equilibrium_for_every_model(tmp_path):
-    bench = bench_of(tmp_path, start={"load_at": "tip", "force": 2.0})
-    model = MultiPhiModel(bench.structure, bench.contacts(rigid=False))
-    expected = bench.structure.row("tip") @ model.static_equilibrium({"tip": 2.0})
+    setup = bench_of(tmp_path, start={"load_at": "tip", "force": 2.0})
+    model = MultiPhiModel(setup.structure, setup.contacts(rigid=False))
+    expected = setup.structure.row("tip") @ model.static_equilibrium({"tip": 2.0})
     for name in ("full", "all"):
-        assert run_model(bench, name, progress=False).points["tip"][0] == pytest.approx(expected, rel=1e-6)
+        assert run_model(setup, name, progress=False).points["tip"][0] == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_start_that_no_force_reaches_is_a_failed_run_with_its_cause(tmp_path):
@@ -191,10 +191,10 @@ def test_a_start_that_no_force_reaches_is_a_failed_run_with_its_cause(tmp_path):
     beam = {"points": {"inside": 0.15, "middle": 0.3, "tip": 0.5}}
     start = {"load_at": "inside", "measured_at": "tip", "displacement": -0.05}
     data = changed(["structure", "beam", "points"], beam["points"]) | {"start": start}
-    bench = bench_of(tmp_path, structure=data["structure"], start=start)
+    setup = bench_of(tmp_path, structure=data["structure"], start=start)
     with pytest.raises(NumericalFailure, match=r"no force at inside moves tip by -0\.05 m"):
-        start_configuration(bench, MultiPhiModel(bench.structure, bench.contacts(rigid=False)))
-    run = run_model(bench, "compliant", progress=False)
+        start_configuration(setup, MultiPhiModel(setup.structure, setup.contacts(rigid=False)))
+    run = run_model(setup, "compliant", progress=False)
     assert run.status == "failed"
     assert "no force at inside" in run.message
 
@@ -225,10 +225,10 @@ def _first_order(structure, damping):
 def test_a_tolerance_in_place_of_a_number_of_modes(tmp_path):
     data = changed(["models", 1], {"kind": "reduced", "name": "to-1-percent", "tolerance": 0.01})
     scene = load_scene(write(tmp_path / "scene.toml", data))
-    bench = prepare(scene, mechanics_of(scene))
-    run = run_model(bench, "to-1-percent")
+    setup = prepare(scene, mechanics_of(scene))
+    run = run_model(setup, "to-1-percent")
     assert run.label == "Multi-Phi, compliant levels, modes for a truncation error of 0.01"
-    assert 2 <= run.dofs < bench.structure.n - 1
+    assert 2 <= run.dofs < setup.structure.n - 1
     assert run.indicators["0.1"] <= 0.01
 
 
@@ -247,7 +247,7 @@ def test_short_runs_are_repeated_until_their_time_is_steady_and_long_ones_once(m
     assert repeated(lambda: 0.001, 0.001, 0) == ()
 
 
-def test_the_loop_is_compiled_before_the_clock_starts(bench, monkeypatch):
+def test_the_loop_is_compiled_before_the_clock_starts(setup, monkeypatch):
     called = []
     for module, name in ((runner, "compile_entries"), (reduced_runner, "simulate")):
         function = getattr(module, name)
@@ -257,7 +257,7 @@ def test_the_loop_is_compiled_before_the_clock_starts(bench, monkeypatch):
             return function(*given, **options)
 
         monkeypatch.setattr(module, name, told)
-    name = next(name for name, spec in bench.scene.models.items() if spec.kind == "reduced")
-    run_model(bench, name, progress=False)
+    name = next(name for name, spec in setup.scene.models.items() if spec.kind == "reduced")
+    run_model(setup, name, progress=False)
     assert called[:2] == ["compile_entries", "simulate"]
     assert called.count("compile_entries") == 1

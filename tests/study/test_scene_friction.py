@@ -37,14 +37,14 @@ SCENE = BEAM | {
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory):
+def setup(tmp_path_factory):
     scene = load_scene(write(tmp_path_factory.mktemp("scene") / "ring.toml", SCENE))
     return prepare(scene, mechanics_of(scene))
 
 
 @pytest.fixture(scope="module")
-def compared(bench):
-    return compare(bench, {}, progress=False)
+def compared(setup):
+    return compare(setup, {}, progress=False)
 
 
 def test_full_beam_reduced_model_and_body_answer_alike(compared):
@@ -85,10 +85,10 @@ def test_grey_is_where_it_sticks_if_there_are_no_contacts(compared):
 
 def test_the_user_object_of_a_stop_that_rubs_is_its_reduced_model():
     scene = load_scene("rubbing-stop")
-    bench = prepare(scene, mechanics_of(scene))
-    bench = dataclasses.replace(bench, time=bench.time[bench.time <= 0.25], repeats=1)
+    setup = prepare(scene, mechanics_of(scene))
+    setup = dataclasses.replace(setup, time=setup.time[setup.time <= 0.25], repeats=1)
     names = "reduced-r12", "user-object-r12"
-    reduced, body = (run_model(bench, name, progress=False) for name in names)
+    reduced, body = (run_model(setup, name, progress=False) for name in names)
     assert len(reduced.stick_intervals["stop"]) >= 2
     for field in ("points", "gaps", "contact_force", "friction_force", "slip"):
         for name, values in getattr(reduced, field).items():
@@ -169,13 +169,13 @@ def test_the_limit_of_a_friction_is_an_axis_of_a_study(tmp_path):
 def test_a_stop_that_rubs_may_be_rigid():
     """In a scene's own words, and where a model takes all contacts rigid: along the stop, too."""
     scene = load_scene("rubbing-stop")
-    bench = prepare(scene, mechanics_of(scene))
-    (stop,) = bench.contacts(rigid=True)
+    setup = prepare(scene, mechanics_of(scene))
+    (stop,) = setup.contacts(rigid=True)
     assert stop.stiffness == stop.tangential_stiffness == math.inf
     found = []
     for modes in (20, 40):
-        model = mp.MultiPhiModel(bench.structure, [stop], modes=modes)
-        run = mp.simulate(model, 0.2, loads=bench.loads)
+        model = mp.MultiPhiModel(setup.structure, [stop], modes=modes)
+        run = mp.simulate(model, 0.2, loads=setup.loads)
         assert run.status == "ok"
         assert abs(run.ledger.residual) < 1e-12
         found.append(run.at("side.node3", np.linspace(0, 0.2, 200)))

@@ -91,17 +91,17 @@ class TestForms:
 
     def test_a_law_is_in_balance_at_the_start(self, tmp_path):
         """At the tip a static force holds beam and law together, everywhere else the beam is in balance."""
-        bench = bench_of(tmp_path, with_laws(CUBIC))
-        model = bench.model(bench.scene.models["r12"])
-        x, tip = start_configuration(bench, model), bench.structure.row("tip")
+        setup = bench_of(tmp_path, with_laws(CUBIC))
+        model = setup.model(setup.scene.models["r12"])
+        x, tip = start_configuration(setup, model), setup.structure.row("tip")
         assert tip @ x == pytest.approx(0.01, rel=1e-9)
-        assert bench.structure.stiffness @ x == pytest.approx(tip * 3 * 0.01 * STIFFNESS / 0.5**3, rel=2e-3, abs=1e-6)
-        held = tip @ bench.structure.stiffness @ x + bench.mechanics.force_laws[0].force(0.01)
+        assert setup.structure.stiffness @ x == pytest.approx(tip * 3 * 0.01 * STIFFNESS / 0.5**3, rel=2e-3, abs=1e-6)
+        held = tip @ setup.structure.stiffness @ x + setup.mechanics.force_laws[0].force(0.01)
         np.testing.assert_allclose(model.static_equilibrium({"tip": held}), x, atol=1e-9 * 0.01)
 
     def test_every_kind_is_told_in_words(self, tmp_path):
-        bench = bench_of(tmp_path, with_laws(*(LAWS[k] | {"name": k} for k in LAWS)))
-        assert tuple(law.phrase() for law in bench.scene.file.force_laws) == (
+        setup = bench_of(tmp_path, with_laws(*(LAWS[k] | {"name": k} for k in LAWS)))
+        assert tuple(law.phrase() for law in setup.scene.file.force_laws) == (
             "the force law table at tip (a table of 3 places)",
             "the force law cubic at tip (50 N/m q +2e+06 N/m³ q³)",
             "the force law hertz at tip (20000 N/m^1.5 beyond a gap of 1 mm)",
@@ -188,11 +188,11 @@ class TestReport:
         told = findings(comparison)
         assert "On it acts the force law spring at tip (50 N/m q +2e+06 N/m³ q³)" in told["compared"][0]
         (followed,) = (line for line in told["distrust"] if "force law spring" in line)
-        law = comparison.bench.mechanics.force_laws[0]
+        law = comparison.setup.mechanics.force_laws[0]
         assert f"by {len(law.slopes)} straight segments from -5 to 5 mm, to {percent(law.error)} of" in followed
         assert "leaves the span of the force law spring (-5 to 5 mm): it reaches" in followed
         assert comparison.runs["r6"].label == "Multi-Phi, levels of force laws, r = 6"
-        page = render(comparison, level_modes(comparison), loss_tables(comparison.bench))
+        page = render(comparison, level_modes(comparison), loss_tables(comparison.setup))
         assert "Without the force laws" in page
         assert summary(comparison)["scene"]["force_laws"][0]["k3"] == 2e6
 

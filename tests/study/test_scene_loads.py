@@ -64,8 +64,8 @@ def complaint(folder, data):
 
 class TestForms:
     def test_every_kind_becomes_its_load(self, tmp_path):
-        bench = bench_of(tmp_path, at_rest(*LOADS.values()))
-        constant, harmonic, sampled, sweep, gravity, stop, base = bench.loads
+        setup = bench_of(tmp_path, at_rest(*LOADS.values()))
+        constant, harmonic, sampled, sweep, gravity, stop, base = setup.loads
         assert (constant.at, constant.force) == ({"tip": 1.0, "middle": -0.5}, -2.0)
         assert harmonic.course == Harmonic(2.0, 12.0, 0.5)
         np.testing.assert_array_equal(sampled.force, SAMPLES["values"])
@@ -85,17 +85,17 @@ class TestForms:
         np.testing.assert_array_equal(found.force, [1.0, -1.0])
 
     def test_a_start_left_out_is_rest(self, tmp_path):
-        bench = bench_of(tmp_path, at_rest(HARMONIC))
-        model = MultiPhiModel(bench.structure, bench.mechanics.contacts)
-        np.testing.assert_array_equal(start_configuration(bench, model), np.zeros(bench.structure.n))
+        setup = bench_of(tmp_path, at_rest(HARMONIC))
+        model = MultiPhiModel(setup.structure, setup.mechanics.contacts)
+        np.testing.assert_array_equal(start_configuration(setup, model), np.zeros(setup.structure.n))
 
     @pytest.mark.parametrize("models", [MODELS[:1], MODELS])
     def test_the_transverse_direction_carries_the_whole_weight(self, tmp_path, models):
         """Of linear elements without a full model, and of the full model's own."""
         data = changed(["structure", "beam", "masses"], []) | {"models": models, "comparison": {"reference": "r12"}}
-        bench = bench_of(tmp_path, data | {"loads": [LOADS["gravity"]]})
-        (gravity,) = bench.loads
-        sag = bench.structure.row("tip") @ np.linalg.solve(bench.structure.stiffness, gravity.row(bench.structure))
+        setup = bench_of(tmp_path, data | {"loads": [LOADS["gravity"]]})
+        (gravity,) = setup.loads
+        sag = setup.structure.row("tip") @ np.linalg.solve(setup.structure.stiffness, gravity.row(setup.structure))
         section = BEAM["structure"]["beam"]["sections"][0]
         width, height, modulus = section["width"], section["height"], section["youngs_modulus"]
         line, bending = 2700 * width * height * -9.81, modulus * width * height**3 / 12
@@ -190,7 +190,7 @@ class TestReport:
         assert "released" not in told
 
     def test_energies_are_shares_of_the_largest(self, comparison):
-        page = render(comparison, level_modes(comparison), loss_tables(comparison.bench))
+        page = render(comparison, level_modes(comparison), loss_tables(comparison.setup))
         assert "Shares of the largest energy of the run" in page
         assert "<th>work of loads</th>" in page
         run = comparison.runs["r6"]
@@ -203,11 +203,11 @@ class TestReport:
         assert scene["loads"][0]["amplitude"] == 2.0
 
     def test_tables_of_a_scaled_start_are_left_out(self, comparison):
-        assert loss_tables(comparison.bench) == {}
+        assert loss_tables(comparison.setup) == {}
 
     def test_a_budget_needs_a_start_to_disturb(self, comparison):
         with pytest.raises(MultiPhiValueError, match="without a start, need one"):
-            budget(comparison.bench, 4)
+            budget(comparison.setup, 4)
 
 
 def test_every_kind_is_told_in_words(tmp_path):

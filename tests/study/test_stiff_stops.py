@@ -44,12 +44,12 @@ def test_the_softest_is_the_decade_above_the_structure_and_the_scenes_own_stop(t
 
 
 def test_rigid_levels_are_near_stiff_stops_and_far_from_the_scenes_soft_one(tmp_path):
-    bench = bench_of(tmp_path, RIGID, data=changed(["contacts", 0, "stiffness"], 1e4))
-    stiff, rigid, soft = stiff_stops(bench), run_model(bench, "rigid"), run_model(bench, "all")
+    setup = bench_of(tmp_path, RIGID, data=changed(["contacts", 0, "stiffness"], 1e4))
+    stiff, rigid, soft = stiff_stops(setup), run_model(setup, "rigid"), run_model(setup, "all")
     from_stiff = stiff.error(rigid, ("tip",), 0.1)
-    assert max(from_stiff, stiff.uncertainty(bench.time, ("tip",), 0.1)) < 0.03
+    assert max(from_stiff, stiff.uncertainty(setup.time, ("tip",), 0.1)) < 0.03
     assert stiff.error(soft, ("tip",), 0.1) > 0.1
-    values = stiff.values(bench, {"rigid": rigid})
+    values = stiff.values(setup, {"rigid": rigid})
     assert values["errors"]["rigid"]["0.1"]["tip"] == from_stiff
 
 
@@ -76,8 +76,8 @@ def test_a_failure_is_told_and_measures_nothing(tmp_path, monkeypatch):
         raise NumericalFailure("no way")
 
     monkeypatch.setattr(module, "_histories", failing)
-    bench = bench_of(tmp_path, RIGID)
-    stiff = stiff_stops(bench)
+    setup = bench_of(tmp_path, RIGID)
+    stiff = stiff_stops(setup)
     assert not stiff.ok
-    values = stiff.values(bench, {"rigid": run_model(bench, "rigid")})
+    values = stiff.values(setup, {"rigid": run_model(setup, "rigid")})
     assert (values["message"], values["errors"], values["uncertainty"]) == ("no way", {}, {})

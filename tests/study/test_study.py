@@ -51,10 +51,10 @@ SCENE = BEAM | {
 }
 
 
-def at_rest(bench, name, progress, horizon=False):
+def at_rest(setup, name, progress, horizon=False):
     """A run in which nothing moves."""
-    points = {point: np.zeros(len(bench.time)) for point in bench.points}
-    return ModelRun(name, bench.scene.models[name].kind, name, time=bench.time, points=points)
+    points = {point: np.zeros(len(setup.time)) for point in setup.points}
+    return ModelRun(name, setup.scene.models[name].kind, name, time=setup.time, points=points)
 
 
 @pytest.fixture
@@ -253,7 +253,7 @@ class TestRunning:
     def test_a_setting_that_is_none_at_a_later_point_is_a_gap_with_its_cause(self, store, monkeypatch):
         """Levels with printed frequencies are rigid: at that parameter set the compliant ones are refused."""
         monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.run_model", at_rest)
-        monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.stiff_stops", lambda bench: None)
+        monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.stiff_stops", lambda setup: None)
         study = load_study("sets", quick=True)
         result = run_study(study, store, progress=False)
         refused = {row.parameters["method"] for row in result.rows if "printed frequencies" in row.message}
@@ -271,7 +271,7 @@ class TestRunning:
         against = stiff_errors(result, {})
         assert [setting["modes"] for setting in against.setting] == [4, 8]
         assert (against.stiff_uncertainty == found["rigid"]["uncertainty"]["0.08"]["tip"]).all()
-        monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.stiff_stops", lambda bench: pytest.fail("run again"))
+        monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.stiff_stops", lambda setup: pytest.fail("run again"))
         assert run_study(study, store, progress=False).rows == result.rows
 
     def test_histories_are_kept_on_request(self, study_file, store):

@@ -59,14 +59,14 @@ def begun(given, displacements):
     return levels, [first_start(levels, END, x, None, {}) for x in displacements]
 
 
-def carried(arrays, starts, sums_works=True):
+def carried(arrays, starts, is_summing_works=True):
     """These starts carried to the end together, on arrays whose levels are packed."""
     for start in starts:
         motion = Motion(arrays, start)
-        motion.sums_works = sums_works
+        motion.is_summing_works = is_summing_works
         motion.advance(END)
     motion = Motion(arrays, starts[0])
-    motion.sums_works = sums_works
+    motion.is_summing_works = is_summing_works
     return batch.Batch.run(motion, starts, END, lambda function, *given: function(*given))
 
 
@@ -208,14 +208,14 @@ class TestSeveralRunsTogether:
         check(mp.simulate_many(given[1], END, x, points=["m5"], times=TIMES, threads=2), runs, ["m5"])
         assert sum(len(run.events) for run in runs) > 100
 
-    @pytest.mark.parametrize("sums_works", [True, False])
-    def test_motions_are_whole(self, sums_works):
+    @pytest.mark.parametrize("is_summing_works", [True, False])
+    def test_motions_are_whole(self, is_summing_works):
         """A landed motion is that of a run alone: its segments, events, final state, energies and statistics."""
         own = model(4, stiffness=50.0)
         with kept_back():
             runs = [mp.simulate(own, END, displacement=x) for x in starts(3, most=0.11)]
             levels, given = begun(own, starts(3, most=0.11))
-            found_all = carried(LevelArrays(levels), given, sums_works)
+            found_all = carried(LevelArrays(levels), given, is_summing_works)
         assert found_all.count == 3
         for k, run in enumerate(runs):
             found = found_all.motion(k).trajectory(END)
@@ -223,7 +223,7 @@ class TestSeveralRunsTogether:
                 (s.start, s.end, s.phases) for s in run.segments
             ]
             assert list(found.events) == list(run.events)
-            if sums_works:
+            if is_summing_works:
                 assert found.ledger == run.ledger
             else:  # works that are integrated afterwards have another round-off
                 integrated, summed = dataclasses.astuple(found.ledger), dataclasses.astuple(run.ledger)

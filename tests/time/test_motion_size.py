@@ -126,7 +126,7 @@ def test_a_motion_carried_in_steps_is_not_taken_for_one_that_was_looked_at():
     assert sizes(run) is None
     assert as_segments(run.segments).sizes(END) == pytest.approx(sizes(whole), rel=1e-9)
     again = Run(given, END, BENT).begun()
-    again.go_on_from(whole.final, END)
+    again.continue_from(whole.final, END)
     again.advance(1.5 * END)
     assert sizes(again.trajectory(1.5 * END)) is None
 

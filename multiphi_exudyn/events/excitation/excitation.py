@@ -182,7 +182,7 @@ class Excitation:
         return Drive(time, min((piece.until for piece in pieces), default=math.inf), tuple(terms.items()))
 
     @property
-    def stop_ways(self) -> np.ndarray:
+    def stop_travel(self) -> np.ndarray:
         """Bound (c,) [m] of the displacement of every stop."""
         largest = np.array([history.largest for history in self.histories])
         return np.asarray(np.abs(self.stops[:, : self.prescribed]) @ largest)

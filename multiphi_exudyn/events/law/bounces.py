@@ -55,9 +55,9 @@ __all__ = [
     "apply_further_impact",
     "has_rebounded",
     "is_on_last_bounce",
+    "is_rebound_only",
     "last_bounce",
     "mark_last_bounces",
-    "only_bounces",
     "row_speed",
 ]
 
@@ -128,7 +128,7 @@ def last_bounce(ints: Ints, numbers: Numbers, count: int) -> int:
 
 
 @compiled
-def only_bounces(ints: Ints, numbers: Numbers) -> int:
+def is_rebound_only(ints: Ints, numbers: Numbers) -> int:
     """Return 1 if an instant has changed nothing but rebounds of contacts with restitution below 1."""
     for k in range(ints[CHANGE_COUNT]):
         restitution = numbers[ints[RESTITUTIONS] + ints[ints[CHANGES] + k * CHANGE_WIDTH]]

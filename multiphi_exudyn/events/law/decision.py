@@ -12,7 +12,7 @@ be. The truncated bases of two levels need not agree, so the law says what happe
 the functions that implement it:
 
 1. A contact is *armed* while s >= 0. When s falls through zero it requests a change of state.
-   -> phases.phase_of, monitoring.watch, monitoring.who_asks, decision.decide_jump
+   -> phases.phase_of, monitoring.watch, monitoring.collect_requests, decision.decide_jump
 2. A rigid contact that requests to close is decided together with all rigid contacts that touch, in the basis of the
    level in which all of them are open: first Moreau's impact, then complementarity of acceleration and reaction. A
    contact closes only if its reaction in the level entered is >= 0. A contact counts as at rest at its stop also if its
@@ -36,12 +36,12 @@ the functions that implement it:
    it is armed), or until s in the level it would enter has risen to zero (then it changes). If it would then repeat its
    request at the same instant without end, it is *held back* until s has risen to zero, or until another contact
    requests a change.
-   -> phases.update_phases, monitoring.watch, monitoring.flag_again, phases.hold_back
+   -> phases.update_phases, monitoring.watch, monitoring.flag_repeated_requests, phases.hold_back
 7. A viscous contact never pulls. It opens when its force falls to zero, mostly before its gap has risen to zero. It is
    then open with g < 0 and refused as in 6: it is armed when g has risen to zero, and closes when its force in the
    level with it closed has risen to zero. It may stay closed only with a force >= 0, and may open if its force would be
    negative.
-   -> switching.is_relaxing
+   -> switching.would_pull_if_closed
 8. A force law requests the next segment at either end of its present one, and always changes. If truncation has moved
    its displacement further, it requests the segment in which its displacement lies. It goes on at the same instant
    until its segment contains its displacement, but does not return to the segment that it has just left.
@@ -157,7 +157,7 @@ from multiphi_exudyn.events.law.changes import (
     is_closed_rigid,
     set_requested_states,
 )
-from multiphi_exudyn.events.law.phases import hold_back, is_pulled, keep_entered, update_phases
+from multiphi_exudyn.events.law.phases import arm_return_exits, hold_back, is_pulled, update_phases
 from multiphi_exudyn.events.law.rebounds import clear_last_bounces, flag_touching
 from multiphi_exudyn.events.law.sticking import stick_together
 from multiphi_exudyn.events.law.striking import close_without_impact, impact
@@ -246,7 +246,7 @@ def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     else:
         update_phases(ints, numbers, waves, WORKED, -1)
     for _ in range(ROUNDS + c + ints[KNOTS]):
-        keep_entered(ints, numbers)
+        arm_return_exits(ints, numbers)
         refusals = classify_refusals(ints)
         if refusals == 0:
             return OK

@@ -54,7 +54,7 @@ from multiphi_exudyn.mathematics.response.basis_arrays import differentiate
 from multiphi_exudyn.mathematics.round_off import CLEAR, ZERO
 from multiphi_exudyn.mathematics.search.zero_crossing import simultaneous
 
-__all__ = ["arm", "flag_again", "watch", "who_asks"]
+__all__ = ["arm", "collect_requests", "flag_repeated_requests", "watch"]
 
 
 @compiled
@@ -134,7 +134,7 @@ def wait_for(
 
 
 @compiled
-def who_asks(ints: Ints, numbers: Numbers, waves: Waves, count: int, found: int, reached: float) -> int:
+def collect_requests(ints: Ints, numbers: Numbers, waves: Waves, count: int, found: int, reached: float) -> int:
     """1. Set ASKING: the requests of elements whose signals fall through zero at an instant; return their number."""
     level, flags, waiting, asking = ints[CURRENT + LEVEL], ints[FALLEN], ints[WAITING], 0
     for i in range(ints[ELEMENTS]):
@@ -167,7 +167,7 @@ def arm(ints: Ints, exit_number: int) -> None:
 
 
 @compiled
-def flag_again(ints: Ints, at_once: int) -> None:
+def flag_repeated_requests(ints: Ints, at_once: int) -> None:
     """6. Set AGAIN: elements that request a change at the same instant at which they were refused."""
     phases, exits = ints[REACHED + PHASES], ints[ints[REACHED + LEVEL] + EXITS]
     for i in range(ints[ELEMENTS]):

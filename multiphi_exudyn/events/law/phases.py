@@ -52,6 +52,7 @@ from multiphi_exudyn.mathematics.search.zero_crossing import first_sign
 from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, MAY_RECOVER, TAKEN_ONCE
 
 __all__ = [
+    "arm_return_exits",
     "becomes",
     "entered_signal",
     "first_exit",
@@ -59,7 +60,6 @@ __all__ = [
     "is_denied",
     "is_pulled",
     "is_refused",
-    "keep_entered",
     "opening",
     "phase_of",
     "update_phases",
@@ -161,7 +161,7 @@ def hold_back(ints: Ints, state: int) -> None:
 
 
 @compiled
-def keep_entered(ints: Ints, numbers: Numbers) -> None:
+def arm_return_exits(ints: Ints, numbers: Numbers) -> None:
     """Arm exits that are always taken, have a zero signal and lead back to the state before the instant.
 
     The signal by which the element came here was zero too: what either signal says beyond that is round-off. This does

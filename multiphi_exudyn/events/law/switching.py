@@ -96,7 +96,7 @@ def try_targets(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         ints[ints[DENIED] + i] = 0
         target = ints[targets + i]
         if target != NO_REQUEST and is_unconditional(ints, i, target) == 0 and is_denied(ints, ENTERED_STATE, i) == 1:
-            relaxes = is_relaxing(ints, numbers, waves, ENTERED_STATE, i)
+            relaxes = would_pull_if_closed(ints, numbers, waves, ENTERED_STATE, i)
             if relaxes < 0:
                 return relaxes
             ints[ints[DENIED] + i] = 1 - relaxes
@@ -117,7 +117,7 @@ def is_unconditional(ints: Ints, element: int, requested: int) -> int:
 
 
 @compiled
-def is_relaxing(ints: Ints, numbers: Numbers, waves: Waves, state: int, element: int) -> int:
+def would_pull_if_closed(ints: Ints, numbers: Numbers, waves: Waves, state: int, element: int) -> int:
     """7. Return 1 if a viscous contact is open and would pull if it were closed; or NEED."""
     level = ints[state + LEVEL]
     if ints[ints[KINDS] + element] != VISCOUS or ints[ints[level + STATES] + element] != OPEN:

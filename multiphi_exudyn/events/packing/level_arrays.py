@@ -25,7 +25,7 @@ from multiphi_exudyn.events.packing.level_tables import LevelTables
 from multiphi_exudyn.events.packing.scratch_arrays import ScratchArrays
 from multiphi_exudyn.events.transitions.defect_forms import defect_form, start_form
 from multiphi_exudyn.events.transitions.exit_table import ExitTable
-from multiphi_exudyn.events.transitions.exits import after, asked_alone, entered_row, exits_of
+from multiphi_exudyn.events.transitions.exits import after, entered_row, entering_exit, exits_of
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.transitions.transition import Transition
 
@@ -72,7 +72,7 @@ class LevelArrays:
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.levels,)  # a copy starts without levels
 
-    def lent(self, piece: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def borrow_buffers(self, piece: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the buffers for evaluations between two advances of a run, which then writes its state again.
 
         piece: the last piece of the channels that they need.
@@ -278,7 +278,7 @@ class LevelArrays:
         """Pack the signal that an exit's element would have in the level entered alone."""
         level = self.loaded[int(self.ints[source + a.NUMBER])]
         element, exit_ = exits_of(level)[exit_number]
-        entered = self.level(after(level, element, asked_alone(exit_)))  # may replace the buffers
+        entered = self.level(after(level, element, entering_exit(exit_)))  # may replace the buffers
         target = self.loaded[int(self.ints[entered + a.NUMBER])]
         row = entered_row(self.levels.transition(level, target), element)
         signal = self.buffers.put("ints", put_signal(self.buffers.put, level, row))

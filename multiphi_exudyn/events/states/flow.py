@@ -66,7 +66,7 @@ from multiphi_exudyn.mathematics.response.response_arrays import (
     forced_response,
 )
 
-__all__ = ["expand", "signal_sizes", "signal_waves", "state_at", "step_on"]
+__all__ = ["expand", "next_state", "signal_sizes", "signal_waves", "state_at"]
 
 
 @compiled
@@ -293,7 +293,7 @@ def state_at(ints: Ints, numbers: Numbers, waves: Waves, level: int, t: float, x
 
 
 @compiled
-def step_on(ints: Ints, numbers: Numbers, waves: Waves, level: int, step: float, again: int, x: int, v: int) -> None:
+def next_state(ints: Ints, numbers: Numbers, waves: Waves, level: int, step: float, again: int, x: int, v: int) -> None:
     """Compute the state a step [s] after that of the last call; again: 1 if the last call made the same step.
 
     For a flow without powers of time the exponentials are multiplied by those of the step.

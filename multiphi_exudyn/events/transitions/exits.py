@@ -21,18 +21,18 @@ from multiphi_exudyn.mechanics.element import ElementState, Exit
 __all__ = [
     "ExitShares",
     "after",
-    "asked_alone",
     "asked_state",
     "entered_row",
+    "entering_exit",
     "exits_of",
     "force_shares",
+    "return_exit",
     "rows_of",
     "signal_row",
     "signal_rows",
     "signal_table",
     "signals_of",
     "state_of",
-    "way_back",
 ]
 
 
@@ -59,7 +59,7 @@ def after(level: LoadedLevel, element: int, exit_: Exit) -> tuple[int, ...]:
     return tuple(states)
 
 
-def asked_alone(exit_: Exit) -> Exit:
+def entering_exit(exit_: Exit) -> Exit:
     """Return the exit of the level that an element would enter alone.
 
     For a contact that would slide it is the exit to slip: entering stick would remove its slip velocity.
@@ -176,7 +176,7 @@ def signal_rows(level: LoadedLevel) -> list[Row]:
     return rows
 
 
-def way_back(level: LoadedLevel, element: int, exit_: Exit) -> Exit:
+def return_exit(level: LoadedLevel, element: int, exit_: Exit) -> Exit:
     """Return the exit by which an element would come back from the state that an exit leads to."""
     states = level.level.base.contacts[element].states
     return _return_exit(state_of(level, element), next(state for state in states if state.name == exit_.asked))

@@ -306,7 +306,7 @@ class MultiPhiBody:
     def _begin_run_ahead(self, mbs: Any, step: float, end: float) -> None:
         """Begin a run along the exact motion from the present state and time on."""
         exact = motion_of(self.own_loads.loaded_levels, self._motion.start)
-        exact.sums_works = False  # a body does not report works
+        exact.is_summing_works = False  # a body does not report works
         motion, coordinates = KnownMotion(exact, self._state, self.time), self.coordinates
         coordinates.set_level_in_run(mbs, coordinates.stepped, coordinates.stepped.drive)
         self._run_ahead = RunAhead(self, motion, self._record, self.time, step, end)

@@ -27,7 +27,7 @@ from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.time.run.motion import Motion
-from multiphi_exudyn.time.simulate import Run, holding, outside_of, started
+from multiphi_exudyn.time.simulate import Run, base_warnings_of, holding, started
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["CreateMultiPhiBody"]
@@ -155,7 +155,7 @@ def CreateMultiPhiBody(
     rows = [node.rows for node in nodes]
     model = holding(model, loads, start, rows)
     run = started(Run(model, PROVISIONAL, displacement, velocity, loads, start=start, rewound=True))
-    body = MultiPhiBody(name, _motion(run), loads, PROVISIONAL, matchedStepSize, outside_of(run, model, rows))
+    body = MultiPhiBody(name, _motion(run), loads, PROVISIONAL, matchedStepSize, base_warnings_of(run, model, rows))
     moving_surfaces = [link for link in model.links if link.velocity]
     if nodes and moving_surfaces:
         name, speed = moving_surfaces[0].name, moving_surfaces[0].velocity

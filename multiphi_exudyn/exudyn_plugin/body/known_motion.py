@@ -119,7 +119,7 @@ class KnownMotion:
     def advance(self, until: float) -> MotionInterval:
         """The next interval, up to ``until`` [s]."""
         motion = self._motion
-        motion.go_on_from(*self._continuation)
+        motion.continue_from(*self._continuation)
         motion.advance(until)
         self._continuation = motion.state, motion.time
         times, _, _, truncated = motion.events.table().T
@@ -133,7 +133,7 @@ class KnownMotion:
             final_state=motion.state,
             failure=motion.message,
             segments=segments,
-            phases=motion.record.standings(),
+            phases=motion.record.start_phases(),
             static_levels=motion.levels.alone,
         )
 

@@ -128,7 +128,7 @@ class ExactMotion:
                     continue
             changed = changed or bool(arrays.ints[a.EVENT_COUNT])
             if not trial:
-                self._record.take_events()
+                self._record.collect_events()
                 if status == a.FAILED:
                     raise self._motion.failure()
             if status not in (a.FULL, a.NEED):

@@ -21,7 +21,7 @@ import numpy as np
 
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.packing.level_arrays import LevelArrays
-from multiphi_exudyn.events.transitions.exits import after, asked_alone, exits_of, force_shares, way_back
+from multiphi_exudyn.events.transitions.exits import after, entering_exit, exits_of, force_shares, return_exit
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
 
@@ -188,8 +188,8 @@ class ConstantForces:
         ints, numbers, n, r = self.arrays.ints, self.arrays.numbers, self._width(level), len(self._shifts[level])
         loaded, row = self.arrays.loaded[int(ints[level + a.NUMBER])], int(ints[ints[exit_ + a.ENTERED] + a.ROW])
         element, exit_taken = exits_of(loaded)[(exit_ - int(ints[level + a.EXITS])) // a.EXIT_INTS]
-        alone = asked_alone(exit_taken)
-        back = way_back(loaded, element, alone)
+        alone = entering_exit(exit_taken)
+        back = return_exit(loaded, element, alone)
         plain = self._entered_constants.setdefault(exit_, float(numbers[row + 2 * n]))
         numbers[row + 2 * n] = plain + numbers[row : row + r] @ self._shifts[level]
         entered = self.arrays.levels.level(after(loaded, element, alone))

@@ -62,7 +62,7 @@ class Modes:
         """Number of modes m."""
         return len(self.omega)
 
-    def turned(self, rows: np.ndarray) -> Modes:
+    def aligned(self, rows: np.ndarray) -> Modes:
         """Return the same modes with signs and bases of clusters chosen by ``rows`` (k, n), then by the coordinates."""
         sizes = np.linalg.norm(np.vstack([rows @ self.shapes, self.shapes]), axis=1)
         squares, shapes, _ = aligned_modes(self.omega**2, self.shapes, rows, sizes)

@@ -27,7 +27,7 @@ from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.model_kinds import FullModel, ModelSpec, ReducedModel, UserObjectModel
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart, LoadedStart
-from multiphi_exudyn.study.scene.workbench import Workbench
+from multiphi_exudyn.study.scene.workbench import Setup
 
 __all__ = ["CAUSES", "Budget", "Rung", "budget", "decomposition"]
 
@@ -74,45 +74,45 @@ class Rung:
 class Budget:
     """The ladders of one scene: "rigid", the paper's contact, and "compliant"; modes: r of their truncated rungs."""
 
-    bench: Workbench
+    setup: Setup
     modes: int
     ladders: Mapping[str, tuple[Rung, ...]]
 
     def values(self) -> dict[str, Any]:
         """All of it as numbers and words that JSON can hold; group "all": the judged points together."""
-        scene, judged = self.bench.scene, self.bench.judged_points
+        scene, judged = self.setup.scene, self.setup.judged_points
         groups = {"all": judged} | {point: (point,) for point in judged}
         return {
             "scene": scene.name,
-            "parameter_set": self.bench.mechanics.parameter_set,
-            "start": _start(self.bench).model_dump(),
+            "parameter_set": self.setup.mechanics.parameter_set,
+            "start": _start(self.setup).model_dump(),
             "modes": self.modes,
-            "dofs": self.bench.structure.n,
+            "dofs": self.setup.structure.n,
             "rungs": {rung.name: _rung_values(rung) for rungs in self.ladders.values() for rung in rungs},
             "windows": {
                 f"{until:g}": {
                     ladder: {group: decomposition(rungs, points, until) for group, points in groups.items()}
                     for ladder, rungs in self.ladders.items()
                 }
-                for until in self.bench.windows
+                for until in self.setup.windows
             },
         }
 
 
-def budget(bench: Workbench, modes: int, step: float | None = None, progress: bool = True) -> Budget:
-    """Run every rung of both ladders on the bench's scene; a rung that fails is missing, with its cause.
+def budget(setup: Setup, modes: int, step: float | None = None, progress: bool = True) -> Budget:
+    """Run every rung of both ladders on the setup's scene; a rung that fails is missing, with its cause.
 
     modes: r of the truncated rungs. step: the full beam's working step [s]; none given: that of the reference's
     coarser copy, or the reference's own. progress: shown for the runs of the full beam.
     """
-    _check(bench, modes, step)
-    reduced = {name: _reduced_rung(bench, name, modes) for name in dict.fromkeys(itertools.chain(*LADDERS.values()))}
-    full = _full_rungs(bench, step, reduced["linear-compliant"].run, progress)
+    _check(setup, modes, step)
+    reduced = {name: _reduced_rung(setup, name, modes) for name in dict.fromkeys(itertools.chain(*LADDERS.values()))}
+    full = _full_rungs(setup, step, reduced["linear-compliant"].run, progress)
     ladders = {
         ladder: (*full, *(replace(reduced[name], cause=cause) for name, cause in causes.items()))
         for ladder, causes in LADDERS.items()
     }
-    return Budget(bench, modes, ladders)
+    return Budget(setup, modes, ladders)
 
 
 def decomposition(rungs: Sequence[Rung], points: Sequence[str], until: float) -> dict[str, Any] | None:
@@ -200,82 +200,82 @@ def _sum(values: Sequence[float | None]) -> float | None:
     return math.fsum(known) if len(known) == len(values) else None
 
 
-def _check(bench: Workbench, modes: int, step: float | None) -> None:
-    most = bench.structure.n - bench.mechanics.direction_count
+def _check(setup: Setup, modes: int, step: float | None) -> None:
+    most = setup.structure.n - setup.mechanics.direction_count
     if isinstance(modes, bool) or not isinstance(modes, int):
         raise MultiPhiTypeError(f"modes: got {modes!r}, need an integer")
     if not 1 <= modes <= most:
         raise MultiPhiValueError(f"modes: got {modes}, need 1 to {most} for this structure")
     if step is not None and not (math.isfinite(step) and step > 0):
         raise MultiPhiValueError(f"step: got {step!r}, need a finite time > 0 s")
-    if bench.scene.file.start is None:
-        raise MultiPhiValueError(f"scene: got {bench.scene.name} without a start, need one (the budget disturbs it)")
-    if bench.overrides:
+    if setup.scene.file.start is None:
+        raise MultiPhiValueError(f"scene: got {setup.scene.name} without a start, need one (the budget disturbs it)")
+    if setup.overrides:
         raise MultiPhiValueError(
-            f"scene: got {bench.scene.name} with printed frequencies, need a scene whose levels are of one structure"
+            f"scene: got {setup.scene.name} with printed frequencies, need a scene whose levels are of one structure"
         )
 
 
-def _start(bench: Workbench) -> DisplacedStart | LoadedStart:
-    assert bench.scene.file.start is not None, "checked where the budget begins"
-    return bench.scene.file.start
+def _start(setup: Setup) -> DisplacedStart | LoadedStart:
+    assert setup.scene.file.start is not None, "checked where the budget begins"
+    return setup.scene.file.start
 
 
-def _run(bench: Workbench, spec: ModelSpec, disturbance: float = 0.0, progress: bool = False) -> ModelRun:
-    """One model, once, on the bench's scene, its start scaled by 1 + ``disturbance``."""
-    start = _start(bench)
+def _run(setup: Setup, spec: ModelSpec, disturbance: float = 0.0, progress: bool = False) -> ModelRun:
+    """One model, once, on the setup's scene, its start scaled by 1 + ``disturbance``."""
+    start = _start(setup)
     size = "displacement" if isinstance(start, DisplacedStart) else "force"
     scaled = start.model_copy(update={size: getattr(start, size) * (1 + disturbance)})
-    file = bench.scene.file.model_copy(update={"start": scaled, "models": (spec,)})
-    return run_model(replace(bench, scene=replace(bench.scene, file=file), repeats=0), spec.name, progress)
+    file = setup.scene.file.model_copy(update={"start": scaled, "models": (spec,)})
+    return run_model(replace(setup, scene=replace(setup.scene, file=file), repeats=0), spec.name, progress)
 
 
-def _disturbed(bench: Workbench, spec: ModelSpec) -> dict[str, tuple[ModelRun, ...]]:
-    return {"disturbed start": tuple(_run(bench, spec, disturbance) for disturbance in DISTURBANCES)}
+def _disturbed(setup: Setup, spec: ModelSpec) -> dict[str, tuple[ModelRun, ...]]:
+    return {"disturbed start": tuple(_run(setup, spec, disturbance) for disturbance in DISTURBANCES)}
 
 
-def _reduced_rung(bench: Workbench, name: str, modes: int) -> Rung:
+def _reduced_rung(setup: Setup, name: str, modes: int) -> Rung:
     """A rung below the full beam, by its name; its cause depends on the ladder."""
     kind, contact = name.rsplit("-", 1)
     given: dict[str, Any] = {"name": name, "contact": "rigid" if contact == "rigid" else "as-given"}
     if kind == "user-object":
-        steps = [model.step for model in bench.scene.models.values() if isinstance(model, UserObjectModel)]
+        steps = [model.step for model in setup.scene.models.values() if isinstance(model, UserObjectModel)]
         body = UserObjectModel(kind="user-object", modes=modes, step=steps[0] if steps else BODY_STEP, **given)
         label = f"Exudyn user object, r = {modes}, step {1e6 * body.step:g} µs, {contact} contacts"
-        return _body_rung(bench, body, label)
+        return _body_rung(setup, body, label)
     spec = ReducedModel(kind="reduced", modes="all" if kind == "linear" else modes, **given)
     what = "linear beam, all modes" if kind == "linear" else f"Multi-Phi, r = {modes}"
-    run, changed, repeat = _run(bench, spec), _disturbed(bench, spec), _run(bench, spec, REPEAT)
+    run, changed, repeat = _run(setup, spec), _disturbed(setup, spec), _run(setup, spec, REPEAT)
     return Rung(name, f"{what}, {contact} contacts", "", run, changed, repeat)
 
 
-def _body_rung(bench: Workbench, spec: UserObjectModel, label: str) -> Rung:
+def _body_rung(setup: Setup, spec: UserObjectModel, label: str) -> Rung:
     half, third = (spec.model_copy(update={"step": spec.step / parts}) for parts in (2, 3))
-    changed = _disturbed(bench, spec) | {"half the step": (_run(bench, half),)}
-    return Rung(spec.name, label, "", _run(bench, spec), changed, _run(bench, third, REPEAT))
+    changed = _disturbed(setup, spec) | {"half the step": (_run(setup, half),)}
+    return Rung(spec.name, label, "", _run(setup, spec), changed, _run(setup, third, REPEAT))
 
 
-def _full_rungs(bench: Workbench, step: float | None, linear: ModelRun, progress: bool) -> tuple[Rung, Rung]:
+def _full_rungs(setup: Setup, step: float | None, linear: ModelRun, progress: bool) -> tuple[Rung, Rung]:
     """The full beam at its working step, and converged in step."""
-    spec = _full_model(bench, step)
+    spec = _full_model(setup, step)
     if spec is None:
         none = ModelRun("full", "full", "full beam", status="failed", message="the scene has no full beam")
         return Rung(WORKING, none.label, STEPS, none), Rung(CONVERGED, none.label, GEOMETRY, none)
     specs = [spec.model_copy(update={"step": spec.step / 2**i}) for i in range(HALVINGS + 1)]
-    runs = [_run(bench, specs[0], progress=progress)]
-    while len(runs) <= HALVINGS and not _settled(bench, runs, linear):
-        runs.append(_run(bench, specs[len(runs)], progress=progress))
+    runs = [_run(setup, specs[0], progress=progress)]
+    while len(runs) <= HALVINGS and not _settled(setup, runs, linear):
+        runs.append(_run(setup, specs[len(runs)], progress=progress))
     finest = specs[len(runs) - 1]
-    repeat = _run(bench, finest.model_copy(update={"step": NEARBY * finest.step}), progress=progress)
+    repeat = _run(setup, finest.model_copy(update={"step": NEARBY * finest.step}), progress=progress)
     halved = {"last halving of the step": (runs[-2],)}
     labels = [f"full beam, step {1e6 * each.step:g} µs" for each in (spec, finest)]
-    working = Rung(WORKING, labels[0], STEPS, runs[0], _disturbed(bench, spec))
+    working = Rung(WORKING, labels[0], STEPS, runs[0], _disturbed(setup, spec))
     return working, Rung(CONVERGED, labels[1], GEOMETRY, runs[-1], halved, repeat)
 
 
-def _full_model(bench: Workbench, step: float | None) -> FullModel | None:
+def _full_model(setup: Setup, step: float | None) -> FullModel | None:
     """The reference, or the first full beam where that is none, at the working step."""
-    models, roles = bench.scene.models, bench.scene.file.comparison
+    models, roles = setup.scene.models, setup.scene.file.comparison
     full = [model for model in (models[roles.reference], *models.values()) if isinstance(model, FullModel)]
     if not full:
         return None
@@ -284,11 +284,11 @@ def _full_model(bench: Workbench, step: float | None) -> FullModel | None:
     return full[0].model_copy(update={"step": own if step is None else step})
 
 
-def _settled(bench: Workbench, runs: Sequence[ModelRun], linear: ModelRun) -> bool:
+def _settled(setup: Setup, runs: Sequence[ModelRun], linear: ModelRun) -> bool:
     """Whether the last of at least two halvings changed little beside the difference to the linear beam."""
     if len(runs) < 3 or not (runs[-1].ok and runs[-2].ok and linear.ok):
         return False
-    last, before, other = (_history(run, bench.judged_points, bench.t_end) for run in (runs[-1], runs[-2], linear))
+    last, before, other = (_history(run, setup.judged_points, setup.t_end) for run in (runs[-1], runs[-2], linear))
     return _norm(last - before) <= SETTLED * _norm(last - other)
 
 

@@ -30,7 +30,7 @@ from multiphi_exudyn.study.running.environment import environment
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun, from_arrays, to_arrays
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.workbench import Workbench, prepare
+from multiphi_exudyn.study.scene.workbench import Setup, prepare
 from multiphi_exudyn.study.sweep.row import Row
 from multiphi_exudyn.study.sweep.run import Function, Outcome
 from multiphi_exudyn.study.sweep.store import Store
@@ -54,18 +54,18 @@ class MeasuredRun:
 
     def __call__(self, parameters: Mapping[str, Any]) -> Outcome:
         """The run's measures, and the run itself as arrays."""
-        bench = replace(_bench(self.study, parameters), repeats=0)
+        setup = replace(_bench(self.study, parameters), repeats=0)
         nudged = parameters["at"] == self.study.points[0] and not parameters["nearby"]
-        run = run_model(bench, self.study.model_name(parameters), progress=False, horizon=nudged)
-        indicator = run.indicators.get(f"{_window(self.study, bench):g}")
-        values = measures(bench, run, self.reference) | {"indicator": indicator}
-        values |= self._against_stiff(bench, run)
+        run = run_model(setup, self.study.model_name(parameters), progress=False, horizon=nudged)
+        indicator = run.indicators.get(f"{_window(self.study, setup):g}")
+        values = measures(setup, run, self.reference) | {"indicator": indicator}
+        values |= self._against_stiff(setup, run)
         return Outcome(values, to_arrays(run), run.status, run.message)
 
-    def _against_stiff(self, bench: Workbench, run: ModelRun) -> dict[str, Any]:
-        if self.stiff is None or run.name not in rigid_models(bench):
+    def _against_stiff(self, setup: Setup, run: ModelRun) -> dict[str, Any]:
+        if self.stiff is None or run.name not in rigid_models(setup):
             return {}
-        found = self.stiff.values(bench, {run.name: run})
+        found = self.stiff.values(setup, {run.name: run})
         return {"stiff_stops": found | {"errors": found["errors"].get(run.name, {})}}
 
 
@@ -77,8 +77,8 @@ class TimedRun:
 
     def __call__(self, parameters: Mapping[str, Any]) -> Outcome:
         """Times [s], and the machine's load average of the last minute when they were taken."""
-        bench = _bench(self.study, parameters)
-        run = run_model(bench, self.study.model_name(parameters), progress=False)
+        setup = _bench(self.study, parameters)
+        run = run_model(setup, self.study.model_name(parameters), progress=False)
         values = {
             "first_s": run.first_s,
             "repeats_s": list(run.repeats_s),
@@ -98,8 +98,8 @@ class BudgetRun:
 
     def __call__(self, parameters: Mapping[str, Any]) -> Outcome:
         """The budget's values; failed, with the cause, where a rung is missing."""
-        bench = _bench(self.study, parameters)
-        values = budget(bench, parameters["setting"]["modes"], progress=False).values()
+        setup = _bench(self.study, parameters)
+        values = budget(setup, parameters["setting"]["modes"], progress=False).values()
         causes = [f"{name}: {rung['message']}" for name, rung in values["rungs"].items() if rung["status"] != "ok"]
         return Outcome(values, {}, "failed" if causes else "ok", "; ".join(causes))
 
@@ -143,14 +143,14 @@ def _stiff(study: Study, cases: Sequence[Parameters], store: Store) -> StiffStop
     return None
 
 
-def _bench(study: Study, parameters: Mapping[str, Any]) -> Workbench:
+def _bench(study: Study, parameters: Mapping[str, Any]) -> Setup:
     scene = study.scene_for(parameters)
     return prepare(scene, mechanics_of(scene))
 
 
-def _window(study: Study, bench: Workbench) -> float:
+def _window(study: Study, setup: Setup) -> float:
     """End [s] of the window whose errors are ranked."""
-    return min(study.file.window or bench.t_end, bench.t_end)
+    return min(study.file.window or setup.t_end, setup.t_end)
 
 
 def _timed(study: Study, rows: Sequence[Row]) -> list[Parameters]:
@@ -162,12 +162,12 @@ def _result(
     study: Study, rows: tuple[Row, ...], timings: tuple[Row, ...], budgets: tuple[Row, ...], store: Store
 ) -> StudyResult:
     first = study.reference(study.points[0])
-    bench = _bench(study, first)
+    setup = _bench(study, first)
     result = StudyResult(
         study=study.file,
         name=study.name,
-        judged_points=bench.judged_points,
-        window=_window(study, bench),
+        judged_points=setup.judged_points,
+        window=_window(study, setup),
         rows=rows,
         timings=timings,
         budgets=budgets,
@@ -197,10 +197,10 @@ def _maps(study: Study, result: StudyResult, full: ModelRun) -> Iterator[MapPair
 def _pairs(study: Study, chosen: tuple[str, Mapping[str, Any]], full: ModelRun) -> Iterator[MapPair]:
     """A method and its setting beside the reference."""
     case = next(case for case in study.runs(study.points[0]) if (case["method"], case["setting"]) == chosen)
-    bench = replace(_bench(study, case), repeats=0)
-    run = run_model(bench, CASE, progress=False)
-    frequencies = FREQUENCIES[FREQUENCIES * FEWEST * bench.scene.file.outputs.interval <= 1]
-    for point in bench.points if run.ok and len(frequencies) else ():
+    setup = replace(_bench(study, case), repeats=0)
+    run = run_model(setup, CASE, progress=False)
+    frequencies = FREQUENCIES[FREQUENCIES * FEWEST * setup.scene.file.outputs.interval <= 1]
+    for point in setup.points if run.ok and len(frequencies) else ():
         yield MapPair(
             point=point,
             label=run.label,
@@ -208,7 +208,7 @@ def _pairs(study: Study, chosen: tuple[str, Mapping[str, Any]], full: ModelRun) 
             reduced=wavelet_map(run.points[point], run.time, frequencies),
             full_contacts=_in_contact(full),
             reduced_contacts=_in_contact(run),
-            frequencies=_level_frequencies(bench),
+            frequencies=_level_frequencies(setup),
         )
 
 
@@ -216,10 +216,10 @@ def _in_contact(run: ModelRun) -> list[list[float]]:
     return sorted(interval for given in run.contact_intervals.values() for interval in given.tolist())
 
 
-def _level_frequencies(bench: Workbench) -> dict[str, list[float]]:
+def _level_frequencies(setup: Setup) -> dict[str, list[float]]:
     """Natural frequencies [Hz] of the case's levels, within the map: the open one, each contact closed alone."""
     lowest, highest = FREQUENCIES[0], FREQUENCIES[-1]
-    contacts = bench.contacts(bench.scene.models[CASE].rigid)
-    model = MultiPhiModel(bench.structure, contacts, modes="all", overrides=bench.overrides)
+    contacts = setup.contacts(setup.scene.models[CASE].rigid)
+    model = MultiPhiModel(setup.structure, contacts, modes="all", overrides=setup.overrides)
     levels = {"open": model.level(())} | {f"{c.name} closed": model.level((c.name,)) for c in model.contacts}
     return {name: [float(f) for f in level.frequencies if lowest <= f <= highest] for name, level in levels.items()}

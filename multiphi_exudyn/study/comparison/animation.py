@@ -33,9 +33,9 @@ from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import Scene
-from multiphi_exudyn.study.scene.workbench import Workbench, mesh_nodes, prepare
+from multiphi_exudyn.study.scene.workbench import Setup, mesh_nodes, prepare
 
-__all__ = ["FRAME_RATE", "AnimatedScene", "gif", "moving_figure", "stage_of"]
+__all__ = ["FRAME_RATE", "AnimatedScene", "gif", "moving_figure", "prepare_animation"]
 
 FRAME_RATE = 25.0  # frames a second
 PERIOD_SHOWN = 10.0  # s of animation for the longest period of the open structure: short bounces last several frames
@@ -58,7 +58,7 @@ class AnimatedScene:
     names of its nodes. slow: slow-motion factor.
     """
 
-    bench: Workbench
+    setup: Setup
     models: tuple[str, str]
     judged: tuple[str, ...]
     beams: Mapping[str, tuple[np.ndarray, tuple[str, ...]]]
@@ -67,18 +67,18 @@ class AnimatedScene:
     @property
     def time(self) -> np.ndarray:
         """Times of the frames [s]."""
-        return np.arange(0.0, self.bench.t_end, 1 / (FRAME_RATE * self.slow))
+        return np.arange(0.0, self.setup.t_end, 1 / (FRAME_RATE * self.slow))
 
     def runs(self, progress: bool) -> dict[str, ModelRun]:
         """Run both models; a failed run has its cause."""
-        return {name: run_model(self.bench, name, progress, retry=True) for name in self.models}
+        return {name: run_model(self.setup, name, progress, retry=True) for name in self.models}
 
     def at(self, run: ModelRun, point: str) -> np.ndarray:
         """Displacement [mm] of a point in every frame."""
         return 1e3 * np.interp(self.time, run.time, run.points[point])
 
 
-def stage_of(
+def prepare_animation(
     scene: Scene, model: str | None = None, reference: str | None = None, slow: float | None = None
 ) -> AnimatedScene:
     """Prepare the animation of a model and a reference; None: those of the scene. slow: slow-motion factor.
@@ -100,9 +100,9 @@ def stage_of(
     node_points = [point for _, points in nodes.values() for point in points]
     shown = tuple(dict.fromkeys([*judged, *contact_points, *node_points]))
     scene = _changed(scene, outputs=scene.file.outputs.model_copy(update={"points": shown}))
-    bench = replace(prepare(scene, replace(mechanics, beams=replace(beams, parts=parts))), repeats=1)
+    setup = replace(prepare(scene, replace(mechanics, beams=replace(beams, parts=parts))), repeats=1)
     return AnimatedScene(
-        bench, models, tuple(judged), nodes, _slow_motion(bench) if slow is None else _checked_factor(slow, bench.t_end)
+        setup, models, tuple(judged), nodes, _slow_motion(setup) if slow is None else _checked_factor(slow, setup.t_end)
     )
 
 
@@ -177,9 +177,9 @@ def _history(line: Line2D, time: np.ndarray, values: np.ndarray) -> Move:
 
 def _stops(animated: AnimatedScene, run: ModelRun, beam: str, axes: Axes, size: float) -> Iterator[Move]:
     """Draw the stop of each contact of a beam as a mark, which changes its colour while the contact is closed."""
-    beams = animated.bench.mechanics.beams
-    assert beams is not None, "checked in stage_of"
-    for contact in animated.bench.mechanics.contacts:
+    beams = animated.setup.mechanics.beams
+    assert beams is not None, "checked in prepare_animation"
+    for contact in animated.setup.mechanics.contacts:
         closed = _closed(run.contact_intervals[contact.name], animated.time)
         gap = 1e3 * np.interp(animated.time, run.time, run.gaps[contact.name])
         for point, c in coefficients(contact).items():
@@ -212,7 +212,7 @@ def _frame(animated: AnimatedScene, runs: Mapping[str, ModelRun], figure: Figure
     )
     axes[-1].set_title(meaning and f"grey: {meaning}", fontsize=9)
     axes[0].legend(loc="upper left")
-    title = f"{animated.bench.scene.file.title}, {animated.slow:g} times slower than in reality"
+    title = f"{animated.setup.scene.file.title}, {animated.slow:g} times slower than in reality"
     run_times = "; ".join(f"{run.label}: {seconds(run.online_s)}" for run in (reduced, reference))
     figure.suptitle(f"{title}\ncomputed in: {run_times}", fontsize=9)
 
@@ -244,9 +244,9 @@ def _checked_name(option: str, name: str, allowed: list[str]) -> str:
     return name
 
 
-def _slow_motion(bench: Workbench) -> float:
+def _slow_motion(setup: Setup) -> float:
     """Default slow-motion factor, to one digit: bounces are visible, and the animation is at most LONGEST."""
-    factor = min(PERIOD_SHOWN / bench.longest_period or math.inf, LONGEST / bench.t_end)
+    factor = min(PERIOD_SHOWN / setup.longest_period or math.inf, LONGEST / setup.t_end)
     return float(f"{factor:.0e}")
 
 

@@ -19,7 +19,7 @@ from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models,
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.model_kinds import ReducedModel, UserObjectModel
-from multiphi_exudyn.study.scene.workbench import ROUND_OFF, Workbench
+from multiphi_exudyn.study.scene.workbench import ROUND_OFF, Setup
 from multiphi_exudyn.study.sweep.row import plain
 
 __all__ = ["MOST_LISTED", "Comparison", "compare", "histories", "summary"]
@@ -34,7 +34,7 @@ class Comparison:
     stiff: what rigid levels are measured against beside the reference; None where there are none.
     """
 
-    bench: Workbench
+    setup: Setup
     runs: Mapping[str, ModelRun]
     environment: Mapping[str, Any]
     stiff: StiffStops | None = None
@@ -42,17 +42,17 @@ class Comparison:
     @property
     def reference(self) -> ModelRun:
         """What the others are measured against."""
-        return self.runs[self.bench.scene.file.comparison.reference]
+        return self.runs[self.setup.scene.file.comparison.reference]
 
     @property
     def coarser(self) -> ModelRun | None:
         """The reference's coarser copy, if it can be measured."""
-        return self.measured.get(self.bench.scene.file.comparison.coarser or "")
+        return self.measured.get(self.setup.scene.file.comparison.coarser or "")
 
     @property
     def cheapest(self) -> tuple[ModelRun, ...]:
         """The full model at its cheapest fair setting, at nearby steps."""
-        return tuple(self.runs[name] for name in self.bench.scene.file.comparison.cheapest)
+        return tuple(self.runs[name] for name in self.setup.scene.file.comparison.cheapest)
 
     @property
     def measured(self) -> dict[str, ModelRun]:
@@ -66,7 +66,7 @@ class Comparison:
         """Runs with rigid levels that can be measured against stiff stops."""
         if self.stiff is None or not self.stiff.ok:
             return {}
-        return {name: self.runs[name] for name in rigid_models(self.bench) if self.runs[name].ok}
+        return {name: self.runs[name] for name in rigid_models(self.setup) if self.runs[name].ok}
 
     @property
     def horizon_tolerances(self) -> tuple[str, ...]:
@@ -76,8 +76,8 @@ class Comparison:
     @property
     def headline_window(self) -> float:
         """The window the headline figures speak of: the longest the scene names that fits into the run."""
-        end = self.bench.t_end
-        return max((w for w in self.bench.scene.file.outputs.windows if w <= end / ROUND_OFF), default=end)
+        end = self.setup.t_end
+        return max((w for w in self.setup.scene.file.outputs.windows if w <= end / ROUND_OFF), default=end)
 
     def error(self, run: ModelRun, point: str, until: float) -> float:
         """NRMSE of a point to the reference from 0 to ``until`` [s]."""
@@ -86,25 +86,25 @@ class Comparison:
     def errors(self, run: ModelRun) -> dict[str, dict[str, float | None]]:
         """NRMSE by window and point."""
         error = functools.partial(self.error, run)
-        return metrics.by_window(self.bench.windows, self.bench.points, error)
+        return metrics.by_window(self.setup.windows, self.setup.points, error)
 
     def worst_error(self, run: ModelRun, until: float) -> float:
         """Largest NRMSE of the judged points."""
-        return max(self.error(run, point, until) for point in self.bench.judged_points)
+        return max(self.error(run, point, until) for point in self.setup.judged_points)
 
     def stiff_error(self, run: ModelRun, until: float) -> float:
         """Largest NRMSE of the judged points of one of the ``rigid`` runs to the stiff stops."""
         assert self.stiff is not None, "there are no rigid runs without one"
-        return self.stiff.error(run, self.bench.judged_points, until)
+        return self.stiff.error(run, self.setup.judged_points, until)
 
     def horizon(self, run: ModelRun, tolerance: float) -> float:
         """Agreement horizon [s] of the judged points."""
-        pairs = [(run.points[p], self.reference.points[p]) for p in self.bench.judged_points]
+        pairs = [(run.points[p], self.reference.points[p]) for p in self.setup.judged_points]
         return metrics.agreement_horizon(pairs, run.time, tolerance)
 
     def twin(self, run: ModelRun) -> ModelRun | None:
         """Of a user object, the same reduced model run by itself, if there is one that is ok."""
-        specs = self.bench.scene.models
+        specs = self.setup.scene.models
         own = specs[run.name]
         if not (isinstance(own, UserObjectModel) and run.ok):
             return None
@@ -122,18 +122,18 @@ class Comparison:
 
     def energy_scale(self, run: ModelRun) -> float:
         """What energies of a run are shares of [J]: the initial energy; under loads, the largest of the run; or 0."""
-        if self.bench.scene.file.loads:
+        if self.setup.scene.file.loads:
             return float(np.max(run.energy, initial=0.0))
         return float(run.ledger.get("initial", 0.0))
 
     @property
     def energy_scale_name(self) -> str:
         """The same in words."""
-        return "largest energy of the run" if self.bench.scene.file.loads else "initial energy"
+        return "largest energy of the run" if self.setup.scene.file.loads else "initial energy"
 
     def first_phase(self, run: ModelRun, contact: str) -> np.ndarray:
         """Contact intervals (m, 2) [s] of the first contact phase."""
-        return metrics.first_phase(run.contact_intervals[contact], self.bench.longest_period)
+        return metrics.first_phase(run.contact_intervals[contact], self.setup.longest_period)
 
     def lift_offs(self, run: ModelRun, contact: str) -> list[float]:
         """Largest gap [m], on the common grid, of every opening inside the first contact phase."""
@@ -144,7 +144,7 @@ class Comparison:
 
 
 def compare(
-    bench: Workbench,
+    setup: Setup,
     environment: Mapping[str, Any],
     progress: bool = True,
     started: Callable[[str], None] = lambda name: None,
@@ -154,15 +154,15 @@ def compare(
     A full beam that fails is tried again at gentler settings, and its row says so.
     """
     runs = {}
-    for name in bench.scene.models:
+    for name in setup.scene.models:
         started(name)
-        runs[name] = run_model(bench, name, progress, retry=True, horizon=True)
-    return Comparison(bench, runs, environment, stiff_stops(bench))
+        runs[name] = run_model(setup, name, progress, retry=True, horizon=True)
+    return Comparison(setup, runs, environment, stiff_stops(setup))
 
 
 def summary(comparison: Comparison) -> dict[str, Any]:
     """The content of summary.json; numbers that do not exist are None. With friction it has ``stick_intervals``."""
-    bench, runs, measured = comparison.bench, comparison.runs, comparison.measured
+    setup, runs, measured = comparison.setup, comparison.runs, comparison.measured
     errors = {name: comparison.errors(run) for name, run in measured.items()}
     own = comparison.coarser
     content = {
@@ -175,15 +175,15 @@ def summary(comparison: Comparison) -> dict[str, Any]:
         "agreement_horizon_s": {
             name: {
                 f"{tolerance:g}": comparison.horizon(run, tolerance)
-                for tolerance in bench.scene.file.outputs.tolerances
+                for tolerance in setup.scene.file.outputs.tolerances
             }
             for name, run in measured.items()
         },
         "contact_intervals": {name: _lists(run.contact_intervals) for name, run in runs.items()},
         "ledger": {name: dict(run.ledger) for name, run in runs.items()},
-        "stiff_stops": comparison.stiff.values(bench, comparison.rigid) if comparison.stiff else {},
+        "stiff_stops": comparison.stiff.values(setup, comparison.rigid) if comparison.stiff else {},
     }
-    if bench.mechanics.frictions:
+    if setup.mechanics.frictions:
         content["stick_intervals"] = {name: _lists(run.stick_intervals) for name, run in runs.items()}
     return dict(plain(content, "summary"))
 
@@ -192,7 +192,7 @@ def histories(comparison: Comparison) -> dict[str, np.ndarray]:
     """The content of histories.npz: "time" [s], "MODEL/point/NAME" [m], "MODEL/gap/CONTACT" [m],
     "MODEL/force/CONTACT" [N], "MODEL/friction/NAME" [N], "MODEL/slip/NAME" [m], "MODEL/energy_time" [s],
     "MODEL/energy" [J]."""
-    arrays = {"time": comparison.bench.time}
+    arrays = {"time": comparison.setup.time}
     for name, run in comparison.runs.items():
         if run.ok:
             kinds = {"point": run.points, "gap": run.gaps, "force": run.contact_force}
@@ -207,25 +207,25 @@ def _lists(intervals: Mapping[str, np.ndarray]) -> dict[str, list[list[float]]]:
 
 
 def _scene(comparison: Comparison) -> dict[str, Any]:
-    bench, file = comparison.bench, comparison.bench.scene.file
+    setup, file = comparison.setup, comparison.setup.scene.file
     return {
-        "name": bench.scene.name,
+        "name": setup.scene.name,
         "title": file.title,
-        "t_end": bench.t_end,
-        "points": bench.points,
-        "judged_points": bench.judged_points,
+        "t_end": setup.t_end,
+        "points": setup.points,
+        "judged_points": setup.judged_points,
         "start": None if file.start is None else file.start.model_dump(),
         "loads": [load.model_dump(exclude_none=True) for load in file.loads],
         "contacts": {
             contact.name: {"gap": contact.gap, "stiffness": _stiffness(contact.stiffness), "damping": contact.damping}
-            for contact in bench.mechanics.contacts
+            for contact in setup.mechanics.contacts
         },
         "force_laws": [law.model_dump(exclude_none=True) for law in file.force_laws],
         "friction": [
             friction.model_dump(exclude_none=True) | {"stiffness": _stiffness(friction.stiffness)}
             for friction in file.friction
         ],
-        "assumptions": bench.mechanics.assumptions,
+        "assumptions": setup.mechanics.assumptions,
     }
 
 

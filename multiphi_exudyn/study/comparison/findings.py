@@ -27,7 +27,7 @@ CURVE_TOLERANCE = 0.05  # NRMSE above which a pointwise comparison says little
 
 def findings(comparison: Comparison) -> dict[str, tuple[str, ...]]:
     """Sentences by section: compared, outcome, distrust; and key_figures, each "quantity | value | source"."""
-    bench, headline = comparison.bench, _headline_runs(comparison)
+    setup, headline = comparison.setup, _headline_runs(comparison)
     cheapest = [run for run in comparison.cheapest if run.ok]
     best = _most_accurate(comparison, "reduced")
     return sentences(
@@ -35,12 +35,12 @@ def findings(comparison: Comparison) -> dict[str, tuple[str, ...]]:
         TEMPLATE,
         ("compared", "outcome", "distrust", "key_figures"),
         comparison=comparison,
-        setup=bench,
+        setup=setup,
         until=comparison.headline_window,
-        start=bench.scene.file.start,
-        loads=load_phrases(bench.scene.file.loads),
-        laws=[law.phrase() for law in bench.scene.file.force_laws],
-        contacts=_contact_phrases(bench.mechanics.contacts),
+        start=setup.scene.file.start,
+        loads=load_phrases(setup.scene.file.loads),
+        laws=[law.phrase() for law in setup.scene.file.force_laws],
+        contacts=_contact_phrases(setup.mechanics.contacts),
         headline=headline,
         best=None if best in headline else best,
         failed=[run for run in comparison.runs.values() if not run.ok],
@@ -48,7 +48,7 @@ def findings(comparison: Comparison) -> dict[str, tuple[str, ...]]:
         cheapest_worst=max(cheapest, key=lambda run: _error(comparison, run), default=None),
         own=comparison.coarser,
         early=list(_separated(comparison, [*headline, comparison.coarser])),
-        followed=[(law, _displacements_beyond_span(comparison, law)) for law in bench.mechanics.force_laws],
+        followed=[(law, _displacements_beyond_span(comparison, law)) for law in setup.mechanics.force_laws],
         twins=list(_twins(comparison)),
         warnings=comparison_warnings(comparison),
     )
@@ -58,7 +58,7 @@ def comparison_warnings(comparison: Comparison) -> list[str]:
     """Warnings of the models about their own results, one sentence for each kind."""
     runs = comparison.runs.items()
     horizons = [(name, run.horizon_s) for name, run in runs]
-    return run_warnings([(name, run.warnings) for name, run in runs], horizons, comparison.bench.t_end)
+    return run_warnings([(name, run.warnings) for name, run in runs], horizons, comparison.setup.t_end)
 
 
 def _contact_phrases(contacts: Sequence[UnilateralContact]) -> list[str]:
@@ -115,8 +115,8 @@ def _headline_runs(comparison: Comparison) -> list[ModelRun]:
 def _separated(comparison: Comparison, runs: Iterable[ModelRun | None]) -> Iterator[str]:
     """Name and time of the runs whose NRMSE exceeds CURVE_TOLERANCE before the end."""
     for run in runs:
-        end = comparison.bench.t_end if run is None else comparison.horizon(run, CURVE_TOLERANCE)
-        if run is not None and end < comparison.bench.t_end:
+        end = comparison.setup.t_end if run is None else comparison.horizon(run, CURVE_TOLERANCE)
+        if run is not None and end < comparison.setup.t_end:
             yield f"{run.name} {end:.2f} s"
 
 
@@ -139,6 +139,6 @@ def _twins(comparison: Comparison) -> Iterator[tuple[ModelRun, ModelRun, float]]
     for run in comparison.runs.values():
         twin = comparison.twin(run)
         if twin is not None:
-            points = comparison.bench.points
-            errors = [metrics.nrmse(run.points[p], twin.points[p], run.time, comparison.bench.t_end) for p in points]
+            points = comparison.setup.points
+            errors = [metrics.nrmse(run.points[p], twin.points[p], run.time, comparison.setup.t_end) for p in points]
             yield run, twin, max(errors)

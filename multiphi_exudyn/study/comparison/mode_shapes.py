@@ -67,20 +67,20 @@ class LevelModes:
 
 def level_modes(comparison: Comparison) -> tuple[LevelModes, ...]:
     """The open level, a lone contact's closed one, and those the reference held longest; none for matrices."""
-    bench, beams = comparison.bench, comparison.bench.mechanics.beams
+    setup, beams = comparison.setup, comparison.setup.mechanics.beams
     if beams is None:
         return ()
-    contacts = bench.contacts(rigid=bench.mechanics.parameter_set is not None)
-    held = level_durations(comparison.reference.contact_intervals, bench.t_end) if comparison.reference.ok else {}
+    contacts = setup.contacts(rigid=setup.mechanics.parameter_set is not None)
+    held = level_durations(comparison.reference.contact_intervals, setup.t_end) if comparison.reference.ok else {}
     longest = sorted(held, key=lambda closed: -held[closed])
     alone = [(contacts[0].name,)] if len(contacts) == 1 else []
-    model, (stations, rows) = MultiPhiModel(bench.structure, contacts, modes=MODE_COUNT), _stations(beams)
+    model, (stations, rows) = MultiPhiModel(setup.structure, contacts, modes=MODE_COUNT), _stations(beams)
     drawn = MultiPhiModel(stations.structure, contacts, modes=MODE_COUNT)
-    published = published_frequencies().values() if bench.mechanics.parameter_set else ()
+    published = published_frequencies().values() if setup.mechanics.parameter_set else ()
     return tuple(
         LevelModes(
             closed=closed,
-            share=held.get(closed, 0.0) / bench.t_end if held else None,
+            share=held.get(closed, 0.0) / setup.t_end if held else None,
             frequencies=model.level(closed).frequencies[:MODE_COUNT],
             beams=_shapes(beams, contacts, closed, rows @ drawn.level(closed).shapes[:, :MODE_COUNT]),
             published=tuple(column for column in published if column.level == closed),

@@ -99,7 +99,7 @@ def history_figure(comparison: Comparison, point: str) -> Figure:
             axes.plot(run.time, 1e3 * run.points[point], **style[run.name].lines, label=run.label)
         _shade(axes, spans)
         axes.set(xlabel="time [s]", ylabel=f"{point} [mm]")
-    whole.set(xlim=(0, comparison.bench.t_end), title=f"Displacement of {point}{meaning and f'; grey: {meaning}'}")
+    whole.set(xlim=(0, comparison.setup.t_end), title=f"Displacement of {point}{meaning and f'; grey: {meaning}'}")
     for axes in detail:
         _detail(axes, comparison, shown, point)
     _differences(difference, comparison, point)
@@ -129,7 +129,7 @@ def error_time_figure(comparison: Comparison) -> Figure:
         axes.axvline(
             comparison.reference.online_s, color=REFERENCE, ls="--", lw=1, label="online time of the reference"
         )
-    axes.set_ylabel(f"NRMSE to {until:g} s\nworst of {', '.join(comparison.bench.judged_points)}")
+    axes.set_ylabel(f"NRMSE to {until:g} s\nworst of {', '.join(comparison.setup.judged_points)}")
     percent_axis(axes.yaxis)
     seconds_axis(axes.xaxis)
     legend_below(figure, [axes], columns=2)
@@ -149,7 +149,7 @@ def contact_figure(comparison: Comparison, contact: str) -> Figure:
         axes.grid(visible=False, axis="y")
     milliseconds_axis(both[1])
     both[0].set(
-        xlim=(0, comparison.bench.t_end), title=f"Contact {contact}: the whole run, and its first contact phase"
+        xlim=(0, comparison.setup.t_end), title=f"Contact {contact}: the whole run, and its first contact phase"
     )
     both[1].set_xlim(*first_contact_span(comparison, [contact]))
     return figure
@@ -163,7 +163,7 @@ def many_contacts_figure(comparison: Comparison) -> Figure:
     for axes, run in zip(rows, runs, strict=True):
         for number, intervals in enumerate(run.contact_intervals.values(), start=1):
             _bars(axes, intervals, number, styles(comparison)[run.name])
-        axes.set(title=run.label, xlim=(0, comparison.bench.t_end), ylabel="number of the contact")
+        axes.set(title=run.label, xlim=(0, comparison.setup.t_end), ylabel="number of the contact")
     rows[-1].set_xlabel("time [s]")
     return figure
 
@@ -177,7 +177,7 @@ def friction_figure(comparison: Comparison, friction: str) -> Figure:
             axes.plot(run.time, values, **styles(comparison)[run.name].lines, label=run.label)
     for axes, label in zip(both, ("friction force [N]", "slip [mm]"), strict=True):
         _shade(axes, comparison.reference.stick_intervals[friction])
-        axes.set(xlim=(0, comparison.bench.t_end), ylabel=label)
+        axes.set(xlim=(0, comparison.setup.t_end), ylabel=label)
     both[0].set_title(f"Friction {friction}; grey: the reference sticks")
     both[0].legend()
     both[1].set_xlabel("time [s]")
@@ -192,7 +192,7 @@ def energy_figure(comparison: Comparison) -> Figure:
         if len(run.energy):
             share = 100 * run.energy / (comparison.energy_scale(run) or run.energy[0])
             curves.plot(run.energy_time, share, **styles(comparison)[run.name].lines, label=run.label)
-    curves.set(xlim=(0, comparison.bench.t_end), xlabel="time [s]", ylim=(0, None))
+    curves.set(xlim=(0, comparison.setup.t_end), xlabel="time [s]", ylim=(0, None))
     curves.set_ylabel(f"energy [% of the {comparison.energy_scale_name}]")
     curves.legend()
     runs = [run for run in comparison.runs.values() if run.ok and run.ledger and comparison.energy_scale(run)]
@@ -211,7 +211,7 @@ def energy_figure(comparison: Comparison) -> Figure:
 
 def plotted_runs(comparison: Comparison) -> list[ModelRun]:
     """Runs drawn with the reference: those with the scene's own number of modes, or all if no model has it."""
-    specs, modes = comparison.bench.scene.models, comparison.bench.scene.file.modes
+    specs, modes = comparison.setup.scene.models, comparison.setup.scene.file.modes
     own = [run for run in _reduced(comparison) if getattr(specs[run.name], "modes", None) == modes]
     return own or _reduced(comparison)
 
@@ -229,10 +229,10 @@ def first_contact_span(comparison: Comparison, contacts: Iterable[str] | None = 
     names = comparison.reference.contact_intervals if contacts is None else contacts
     phases = [phase for name in names if len(phase := comparison.first_phase(comparison.reference, name))]
     if not phases:
-        return 0.0, comparison.bench.t_end
+        return 0.0, comparison.setup.t_end
     start, end = min(phase[0, 0] for phase in phases), max(phase[-1, 1] for phase in phases)
     margin = 0.25 * (end - start)
-    return max(0.0, start - margin), min(comparison.bench.t_end, end + margin)
+    return max(0.0, start - margin), min(comparison.setup.t_end, end + margin)
 
 
 def _reduced(comparison: Comparison) -> list[ModelRun]:
@@ -253,13 +253,13 @@ def _bars(axes: Axes, intervals: np.ndarray, row: float, style: Style) -> None:
 def _detail(axes: Axes, comparison: Comparison, shown: Sequence[ModelRun], point: str) -> None:
     """Limit a panel to the first contact phase, and draw the stops that act on this point alone."""
     start, end = first_contact_span(comparison)
-    inside = (comparison.bench.time >= start) & (comparison.bench.time <= end)
+    inside = (comparison.setup.time >= start) & (comparison.setup.time <= end)
     values = np.array([1e3 * run.points[point][inside] for run in shown])
     margin = 0.06 * np.ptp(values) + 1e-9
     axes.set(xlim=(start, end), ylim=(np.min(values) - margin, np.max(values) + margin))
     milliseconds_axis(axes)
     axes.set_title("Detail of the first contact phase")
-    for contact in comparison.bench.mechanics.contacts:
+    for contact in comparison.setup.mechanics.contacts:
         if list(coefficients(contact)) == [point]:
             _stop(axes, contact, -1e3 * contact.gap / coefficients(contact)[point])
 
@@ -281,9 +281,9 @@ def _differences(axes: Axes, comparison: Comparison, point: str) -> None:
     lowest = max(min(SMALLEST * 1e3 * np.max(np.abs(reference), initial=1e-12), SPAN * largest), np.finfo(float).tiny)
     if comparison.coarser is not None:
         band = np.maximum(largest_so_far(comparison.coarser), lowest / 10)
-        axes.fill_between(comparison.bench.time, lowest / 10, band, color=BAND, lw=0)
+        axes.fill_between(comparison.setup.time, lowest / 10, band, color=BAND, lw=0)
     for run, values in shown:
         axes.plot(run.time, np.maximum(values, lowest / 10), **styles(comparison)[run.name].lines, label=run.label)
-    axes.set(yscale="log", ylim=(lowest, None), xlim=(0, comparison.bench.t_end), xlabel="time [s]")
+    axes.set(yscale="log", ylim=(lowest, None), xlim=(0, comparison.setup.t_end), xlabel="time [s]")
     axes.set_ylabel("largest so far [mm]")
     axes.set_title("Difference to the reference; grey: the reference to its coarser copy")

@@ -50,8 +50,8 @@ RIGID, COMPLIANT = "rigid, as in the published tables", "a spring of the scene's
 
 def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Mapping[str, pd.DataFrame]) -> str:
     """Return the report of a comparison as an HTML page."""
-    bench = comparison.bench
-    contradiction = rig().contradiction if bench.mechanics.parameter_set else ""
+    setup = comparison.setup
+    contradiction = rig().contradiction if setup.mechanics.parameter_set else ""
     pictures = defaultdict[str, list[Picture]](list)
     for section, picture in _pictures(comparison, levels):
         pictures[section].append(picture)
@@ -59,22 +59,22 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Mapping
         environment_of(__package__ or "")
         .get_template(TEMPLATE)
         .render(
-            name=bench.scene.name,
-            title=bench.scene.file.title,
+            name=setup.scene.name,
+            title=setup.scene.file.title,
             findings=findings(comparison),
             definitions=[metrics.METRICS[name] for name in ON_THE_PAGE],
-            assumptions=[each for each in bench.mechanics.assumptions if each != contradiction],
+            assumptions=[each for each in setup.mechanics.assumptions if each != contradiction],
             environment=comparison.environment,
             comparison=comparison,
-            setup=bench,
-            scene=bench.scene,
+            setup=setup,
+            scene=setup.scene,
             levels=levels,
             losses=losses,
             metrics=metrics,
             errors=_errors(comparison),
             stiff_errors=_stiff_errors(comparison, comparison.stiff) if comparison.stiff and comparison.rigid else None,
             pictures=pictures,
-            totals=contact_totals(comparison) if len(bench.mechanics.contacts) > MOST_LISTED else None,
+            totals=contact_totals(comparison) if len(setup.mechanics.contacts) > MOST_LISTED else None,
             zoom=histories_to_zoom(comparison),
             contradiction=contradiction,
         )
@@ -84,7 +84,7 @@ def render(comparison: Comparison, levels: Sequence[LevelModes], losses: Mapping
 def contact_totals(comparison: Comparison) -> pd.DataFrame:
     """Totals over all contacts, one row for each run that is ok."""
     return pd.DataFrame(
-        {name: _totals(run, comparison.bench.t_end) for name, run in comparison.runs.items() if run.ok}
+        {name: _totals(run, comparison.setup.t_end) for name, run in comparison.runs.items() if run.ok}
     ).T
 
 
@@ -106,7 +106,7 @@ def _totals(run: ModelRun, t_end: float) -> dict[str, object]:
 
 def _errors(comparison: Comparison) -> pd.DataFrame:
     """Errors by window and point, agreement horizons and sensitivity horizons, one row for each run."""
-    end, tolerances = comparison.bench.t_end, comparison.bench.scene.file.outputs.tolerances
+    end, tolerances = comparison.setup.t_end, comparison.setup.scene.file.outputs.tolerances
 
     def horizon_text(time: float | None) -> str:
         return "–" if time is None else "whole run" if time >= ROUND_OFF * end else f"{time:.3f} s"
@@ -124,7 +124,7 @@ def _errors(comparison: Comparison) -> pd.DataFrame:
 
 def _stiff_errors(comparison: Comparison, stiff: StiffStops) -> pd.DataFrame:
     """Errors of rigid levels against stiff stops, and the uncertainty of this reference."""
-    values = stiff.values(comparison.bench, comparison.rigid)
+    values = stiff.values(comparison.setup, comparison.rigid)
     tables = values["errors"] | {"own uncertainty": values["uncertainty"]}
     return pd.DataFrame({name: _by_window(table) for name, table in tables.items()}).T
 
@@ -139,7 +139,7 @@ def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterator[
     reference = comparison.reference
     if reference.ok:
         detail = "the first contact phase, " if reference.contact_intervals else ""
-        for point in comparison.bench.points:
+        for point in comparison.setup.points:
             yield "histories", Picture.of(plots.history_figure(comparison, point), HISTORY.format(point, detail))
         cost = COST.format(HOLLOW if comparison.rigid else "")
         yield "cost", Picture.of(plots.error_time_figure(comparison), cost)
@@ -152,5 +152,5 @@ def _pictures(comparison: Comparison, levels: Sequence[LevelModes]) -> Iterator[
             yield "friction", Picture.of(plots.friction_figure(comparison, friction), FRICTION)
         yield "energy", Picture.of(plots.energy_figure(comparison), ENERGY)
     if levels:
-        rigid = comparison.bench.mechanics.parameter_set is not None
+        rigid = comparison.setup.mechanics.parameter_set is not None
         yield "modes", Picture.of(mode_figure(levels), MODES.format(RIGID if rigid else COMPLIANT))

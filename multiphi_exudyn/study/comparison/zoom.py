@@ -54,11 +54,11 @@ def _encoded(values: ArrayLike) -> str:
 
 
 def _plots(comparison: Comparison) -> Iterator[dict[str, Any]]:
-    runs, time = [comparison.reference, *plotted_runs(comparison)], comparison.bench.time
+    runs, time = [comparison.reference, *plotted_runs(comparison)], comparison.setup.time
     x = {"label": "time [s]", "group": "time", "log": False, "start": time[0], "step": time[1] - time[0]}
     contacts = comparison.reference.contact_intervals
     shade, detail = union(contacts.values()).tolist(), list(first_contact_span(comparison))
-    for point in comparison.bench.points:
+    for point in comparison.setup.points:
         lines = [_line(comparison, run, 1e3 * run.points[point]) for run in runs]
         yield zoom_plot(f"{point} [mm]", x, lines, shade=shade, detail=detail)
     for contact, intervals in contacts.items() if len(contacts) <= MOST_LISTED else ():

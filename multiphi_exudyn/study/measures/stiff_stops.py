@@ -26,7 +26,7 @@ from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.workbench import Workbench, start_configuration
+from multiphi_exudyn.study.scene.workbench import Setup, start_configuration
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
@@ -64,40 +64,40 @@ class StiffStops:
         pairs = itertools.combinations(self.histories, 2)
         return max(_largest_nrmse(softer, stiffer, points, time, until) for softer, stiffer in pairs)
 
-    def values(self, bench: Workbench, runs: Mapping[str, ModelRun]) -> dict[str, Any]:
+    def values(self, setup: Setup, runs: Mapping[str, ModelRun]) -> dict[str, Any]:
         """JSON values: uncertainty by window and point, and the errors of ``runs`` by name."""
 
         def uncertainty(point: str, until: float) -> float:
-            return self.uncertainty(bench.time, (point,), until)
+            return self.uncertainty(setup.time, (point,), until)
 
         def errors(run: ModelRun) -> dict[str, dict[str, float | None]]:
-            return metrics.by_window(bench.windows, bench.points, lambda point, until: self.error(run, (point,), until))
+            return metrics.by_window(setup.windows, setup.points, lambda point, until: self.error(run, (point,), until))
 
         return {
             "stiffness": list(self.stiffness),
             "message": self.message,
-            "uncertainty": metrics.by_window(bench.windows, bench.points, uncertainty) if self.ok else {},
+            "uncertainty": metrics.by_window(setup.windows, setup.points, uncertainty) if self.ok else {},
             "errors": {name: errors(run) for name, run in runs.items() if self.ok and run.ok},
         }
 
 
-def rigid_models(bench: Workbench) -> tuple[str, ...]:
+def rigid_models(setup: Setup) -> tuple[str, ...]:
     """Names of the models in which every contact is rigid; empty where levels have printed frequencies."""
-    if bench.overrides or not bench.mechanics.contacts:
+    if setup.overrides or not setup.mechanics.contacts:
         return ()
-    all_rigid = all(contact.rigid for contact in bench.mechanics.contacts)
-    models = bench.scene.models
+    all_rigid = all(contact.rigid for contact in setup.mechanics.contacts)
+    models = setup.scene.models
     return tuple(name for name in models if all_rigid or models[name].rigid)
 
 
-def stiff_stops(bench: Workbench) -> StiffStops | None:
+def stiff_stops(setup: Setup) -> StiffStops | None:
     """Run the linear structure against stiff stops; None where no model of the scene has rigid levels."""
-    if not rigid_models(bench):
+    if not rigid_models(setup):
         return None
-    softest = 10.0 ** math.ceil(math.log10(_least_stiffness(bench)))
+    softest = 10.0 ** math.ceil(math.log10(_least_stiffness(setup)))
     stiffness = tuple(factor * softest for factor in FACTORS)
     try:
-        return StiffStops(stiffness, tuple(_histories(bench, each) for each in stiffness))
+        return StiffStops(stiffness, tuple(_histories(setup, each) for each in stiffness))
     except MultiPhiError as error:
         return StiffStops(stiffness, (), str(error))
 
@@ -108,21 +108,21 @@ def _largest_nrmse(
     return max(metrics.nrmse(values[point], reference[point], time, until) for point in points)
 
 
-def _least_stiffness(bench: Workbench) -> float:
+def _least_stiffness(setup: Setup) -> float:
     """Lower bound of the stiffness of the stops [N/m]; 1 for a structure without stiffness."""
-    level = MultiPhiModel(bench.structure, bench.contacts(rigid=True), modes="all").level(())
+    level = MultiPhiModel(setup.structure, setup.contacts(rigid=True), modes="all").level(())
     elastic = level.squares > 0
     flexibilities = level.gap_rows[:, elastic] ** 2 @ (1 / level.squares[elastic])
-    stiffnesses = [contact.stiffness for contact in bench.mechanics.contacts if not contact.rigid]
+    stiffnesses = [contact.stiffness for contact in setup.mechanics.contacts if not contact.rigid]
     return float(max([*stiffnesses, *(STIFF / flexibilities[flexibilities > 0])], default=1.0))
 
 
-def _histories(bench: Workbench, stiffness: float) -> Histories:
+def _histories(setup: Setup, stiffness: float) -> Histories:
     """Displacements of the structure with all modes and this stiffness [N/m] of every stop."""
-    contacts = [replace(contact, stiffness=stiffness) for contact in bench.contacts(rigid=True)]
-    model = MultiPhiModel(bench.structure, [*contacts, *bench.mechanics.force_laws], modes="all")
+    contacts = [replace(contact, stiffness=stiffness) for contact in setup.contacts(rigid=True)]
+    model = MultiPhiModel(setup.structure, [*contacts, *setup.mechanics.force_laws], modes="all")
     with kept_back():
-        run = simulate(model, bench.t_end, displacement=start_configuration(bench, model), loads=bench.loads)
+        run = simulate(model, setup.t_end, displacement=start_configuration(setup, model), loads=setup.loads)
     if run.status != "ok":
         raise NumericalFailure(f"a stop of {stiffness:g} N/m: {run.status}, {run.message}")
-    return {point: np.asarray(run.at(point, bench.time)) for point in bench.points}
+    return {point: np.asarray(run.at(point, setup.time)) for point in setup.points}

@@ -31,20 +31,20 @@ class BodyRunner(Runner):
     @property
     def steps(self) -> int:
         """Number of time steps of the run."""
-        return int(np.ceil(self.bench.t_end / self.spec.step * (1 - 1e-9)))
+        return int(np.ceil(self.setup.t_end / self.spec.step * (1 - 1e-9)))
 
     def solve(self, prepared: Prepared) -> tuple[BodyHistories, float]:
-        bench = self.bench
-        return solve_body_alone(*prepared, bench.t_end, self.steps, bench.points, loads=bench.loads)
+        setup = self.setup
+        return solve_body_alone(*prepared, setup.t_end, self.steps, setup.points, loads=setup.loads)
 
     def outcome(self, prepared: Prepared, answer: BodyHistories) -> dict[str, Any]:
         return {"dofs": prepared[0].level(()).modes, "steps": self.steps, "warnings": answer.warnings}
 
     def histories(self, prepared: Prepared, answer: BodyHistories) -> dict[str, Any]:
-        contacts = [contact.name for contact in self.bench.mechanics.contacts]
+        contacts = [contact.name for contact in self.setup.mechanics.contacts]
         return {
             "points": {
-                name: CubicHermiteSpline(answer.time, values, answer.velocities[name])(self.bench.time)
+                name: CubicHermiteSpline(answer.time, values, answer.velocities[name])(self.setup.time)
                 for name, values in answer.points.items()
             },
             "gaps": self._interpolated(answer, {name: answer.gaps[name] for name in contacts}),
@@ -58,15 +58,15 @@ class BodyRunner(Runner):
         }
 
     def _interpolated(self, answer: BodyHistories, histories: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        return {name: np.interp(self.bench.time, answer.time, values) for name, values in histories.items()}
+        return {name: np.interp(self.setup.time, answer.time, values) for name, values in histories.items()}
 
     def _ledger(self, answer: BodyHistories) -> dict[str, float]:
         """Energy lost at events, and dissipated by friction along the sampled slip [J]."""
         rows = ["impact", "truncation_kinetic", "truncation_strain", *(["friction"] if answer.slip else [])]
         losses = {row: float(sum(getattr(event.loss, row) for event in answer.events)) for row in rows}
-        for friction in self.bench.mechanics.frictions:
+        for friction in self.setup.mechanics.frictions:
             losses["friction"] += friction.limit * path_length(answer.slip[friction.name])
-        for contact in self.bench.mechanics.contacts:
+        for contact in self.setup.mechanics.contacts:
             if contact.friction:
                 force, slip = answer.friction_force[contact.name], answer.slip[contact.name]
                 losses["friction"] += float(np.trapezoid(force, slip))

@@ -60,15 +60,15 @@ class CraigBamptonRunner(Runner):
 
     @property
     def label(self) -> str:
-        load, interface = self.bench.scene.file.start, self.bench.interface
+        load, interface = self.setup.scene.file.start, self.setup.interface
         start = "" if load is None or load.load_at in interface else ", start projected"
         reduced = f"{len(interface)} interface points + {self.spec.modes} modes"
         return f"Craig-Bampton in Exudyn, {reduced}, step {self.spec.step * 1e6:g} µs{start}"
 
     def prepare(self) -> Component:
-        structure, contacts = self.bench.structure, self.bench.contacts(rigid=False)
-        component = craig_bampton(structure, self.bench.interface, self.spec.modes)
-        x = start_configuration(self.bench, MultiPhiModel(structure, contacts))
+        structure, contacts = self.setup.structure, self.setup.contacts(rigid=False)
+        component = craig_bampton(structure, self.setup.interface, self.spec.modes)
+        x = start_configuration(self.setup, MultiPhiModel(structure, contacts))
         start = component.coordinates(x)
         remainder = x - component.shapes @ start
         return Component(
@@ -76,9 +76,9 @@ class CraigBamptonRunner(Runner):
         )
 
     def solve(self, prepared: Component) -> tuple[CraigBamptonRun, float]:
-        spec, interval = self.spec, self.bench.scene.file.outputs.interval
+        spec, interval = self.spec, self.setup.scene.file.outputs.interval
         settings = CraigBamptonSettings(spec.step, spec.newton_tolerance, spec.spectral_radius, output_step=interval)
-        t_end = self.bench.t_end
+        t_end = self.setup.t_end
         answer = solve_craig_bampton(prepared.component, prepared.contacts, prepared.start, t_end, settings)
         return answer, answer.wall_s
 
@@ -87,12 +87,12 @@ class CraigBamptonRunner(Runner):
         return {"dofs": prepared.component.dofs, "status": status, "message": answer.cause, "steps": answer.steps}
 
     def histories(self, prepared: Component, answer: CraigBamptonRun) -> dict[str, Any]:
-        structure, shapes = self.bench.structure, prepared.component.shapes
+        structure, shapes = self.setup.structure, prepared.component.shapes
         motion = CubicHermiteSpline(answer.time, answer.coordinates, answer.velocities)
-        on_grid = motion(self.bench.time)
-        fine = np.linspace(0.0, self.bench.t_end, GAP_SAMPLES * (len(answer.time) - 1) + 1)
+        on_grid = motion(self.setup.time)
+        fine = np.linspace(0.0, self.setup.t_end, GAP_SAMPLES * (len(answer.time) - 1) + 1)
         fields: dict[str, Any] = {
-            "points": {name: on_grid @ (structure.row(name) @ shapes) for name in self.bench.points},
+            "points": {name: on_grid @ (structure.row(name) @ shapes) for name in self.setup.points},
             "energy_time": answer.time,
             "energy": prepared.energy(answer),
             "ledger": {"truncation_strain": prepared.dropped},

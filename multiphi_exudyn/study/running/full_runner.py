@@ -32,25 +32,25 @@ class FullRunner(Runner):
     @property
     def label(self) -> str:
         kind = "ANCF" if self.spec.beam == "ancf" else "geometrically exact"
-        beam, each = ("beams", " each") if self.bench.mechanics.beam is None else ("beam", "")
+        beam, each = ("beams", " each") if self.setup.mechanics.beam is None else ("beam", "")
         return f"full Exudyn {beam}, {kind}, {self.spec.elements} elements{each}, step {self.spec.step * 1e6:g} µs"
 
     def prepare(self) -> tuple[FullBeam, dict[str, Any]]:
-        beam = self.bench.full_beam(self.spec)
-        damping = damping_matrix(replace(beam.structure, damping=self.bench.mechanics.damping))
-        return beam, {"damping": damping, "loads": self.bench.loads_on(beam), **self._start()}
+        beam = self.setup.full_beam(self.spec)
+        damping = damping_matrix(replace(beam.structure, damping=self.setup.mechanics.damping))
+        return beam, {"damping": damping, "loads": self.setup.loads_on(beam), **self._start()}
 
     def solve(self, prepared: tuple[FullBeam, dict[str, Any]]) -> tuple[list[Attempt], float]:
         beam, options = prepared
 
         def run(beam: FullBeam) -> FullRun:
-            return beam.run(self.bench.t_end, progress=self.progress, **options)
+            return beam.run(self.setup.t_end, progress=self.progress, **options)
 
         runs = attempts(beam, run) if self.retry else [Attempt("as asked", run(beam))]
         return runs, sum(attempt.run.online_s for attempt in runs)
 
     def repeats(self, answer: list[Attempt]) -> int:
-        return self.bench.repeats if len(answer) == 1 else 0
+        return self.setup.repeats if len(answer) == 1 else 0
 
     def outcome(self, prepared: Any, answer: list[Attempt]) -> dict[str, Any]:
         result = answer[-1].run
@@ -67,7 +67,7 @@ class FullRunner(Runner):
         forces, balance = result.contact_force, result.balance
         assert balance is not None, "a run that is ok has a balance"
         return {
-            "points": {name: result.points[name] for name in self.bench.points},
+            "points": {name: result.points[name] for name in self.setup.points},
             "gaps": result.gaps,
             "contact_force": forces,
             "contact_intervals": {name: interval_array(pairs) for name, pairs in result.contact_intervals.items()},
@@ -91,13 +91,13 @@ class FullRunner(Runner):
 
     def _start(self) -> dict[str, Any]:
         """Options of the static start load: point and displacement; empty for a start at rest."""
-        bench, start = self.bench, self.bench.scene.file.start
+        setup, start = self.setup, self.setup.scene.file.start
         if start is None:
             return {}
         if isinstance(start, DisplacedStart):
             return start.model_dump()
-        model = MultiPhiModel(bench.structure, bench.nonlinearities(rigid=False))
-        displacement = float(bench.structure.row(start.load_at) @ start_configuration(bench, model))
+        model = MultiPhiModel(setup.structure, setup.nonlinearities(rigid=False))
+        displacement = float(setup.structure.row(start.load_at) @ start_configuration(setup, model))
         return {"load_at": start.load_at, "measured_at": start.load_at, "displacement": displacement}
 
 

@@ -56,15 +56,15 @@ def needs_of(scene: Scene) -> Needs:
     spec = next((s for s in scene.models.values() if isinstance(s, ReducedModel) and s.tolerance is None), None)
     if spec is None:
         raise MultiPhiValueError(f"{scene.path}: models: got none of kind 'reduced' with a number of modes, need one")
-    bench = prepare(scene, mechanics_of(scene))
-    model, structure = bench.model(spec), bench.structure
+    setup = prepare(scene, mechanics_of(scene))
+    model, structure = setup.model(spec), setup.structure
     model_arguments = {
         "structure": LinearStructure(structure.mass, structure.stiffness, structure.damping, structure.points),
-        "contacts": bench.nonlinearities(spec.rigid),
+        "contacts": setup.nonlinearities(spec.rigid),
         "modes": model.modes,
-        "overrides": bench.overrides,
+        "overrides": setup.overrides,
     }
-    run_arguments = {"t_end": bench.t_end, "displacement": start_configuration(bench, model), "loads": bench.loads}
+    run_arguments = {"t_end": setup.t_end, "displacement": start_configuration(setup, model), "loads": setup.loads}
     values = json.loads(_run_in_process(pickle.dumps((model_arguments, run_arguments))))
     tuples = {name: tuple(values[name]) for name in ("packages", "warnings")}
     return Needs(scene=scene.name, model=spec.name, **values | tuples)

@@ -44,7 +44,7 @@ class ReducedRunner(Runner):
 
     def solve(self, prepared: Prepared) -> tuple[Trajectory, float]:
         model, start = prepared
-        return timed(lambda: simulate(model, self.bench.t_end, start=start, loads=self.bench.loads))
+        return timed(lambda: simulate(model, self.setup.t_end, start=start, loads=self.setup.loads))
 
     def outcome(self, prepared: Prepared, answer: Trajectory) -> dict[str, Any]:
         return {
@@ -56,9 +56,9 @@ class ReducedRunner(Runner):
         }
 
     def histories(self, prepared: Prepared, answer: Trajectory) -> dict[str, Any]:
-        time, t_end = self.bench.time, self.bench.t_end
-        contacts, frictions = [c.name for c in self.bench.mechanics.contacts], self.bench.mechanics.friction_names
-        points, points_s = timed(lambda: {name: answer.at(name, time) for name in self.bench.points})
+        time, t_end = self.setup.time, self.setup.t_end
+        contacts, frictions = [c.name for c in self.setup.mechanics.contacts], self.setup.mechanics.friction_names
+        points, points_s = timed(lambda: {name: answer.at(name, time) for name in self.setup.points})
         gaps, gaps_s = timed(lambda: {name: answer.gap(name, time) for name in contacts})
         energy_time = np.linspace(0.0, t_end, round(t_end / ENERGY_INTERVAL) + 1)
         return {
@@ -80,7 +80,7 @@ class ReducedRunner(Runner):
 
     def indicators(self, answer: Trajectory) -> dict[str, float]:
         """The model's estimates of its truncation error: end of the window [s] -> estimate."""
-        return {f"{until:g}": truncation_indicator(answer, until) for until in self.bench.windows}
+        return {f"{until:g}": truncation_indicator(answer, until) for until in self.setup.windows}
 
 
 class GlobalBasisRunner(ReducedRunner):
@@ -92,12 +92,12 @@ class GlobalBasisRunner(ReducedRunner):
 
     def prepare(self) -> Prepared:
         projected = self.projected()
-        model = MultiPhiModel(projected, self.bench.nonlinearities(self.spec.rigid), modes="all")
-        return model, start_equilibrium(replace(self.bench, structure=projected), model)
+        model = MultiPhiModel(projected, self.setup.nonlinearities(self.spec.rigid), modes="all")
+        return model, start_equilibrium(replace(self.setup, structure=projected), model)
 
     def projected(self) -> LinearStructure:
         """The structure projected on the basis."""
-        return global_basis(self.bench.structure, self.bench.contacts(self.spec.rigid), self.spec.modes)
+        return global_basis(self.setup.structure, self.setup.contacts(self.spec.rigid), self.spec.modes)
 
     def indicators(self, answer: Trajectory) -> dict[str, float]:
         """Empty: the estimate needs modes of levels."""
@@ -113,9 +113,9 @@ class TrainedBasisRunner(GlobalBasisRunner):
 
     def projected(self) -> LinearStructure:
         """The structure projected on the basis."""
-        bench = self.bench
-        complete = MultiPhiModel(bench.structure, bench.nonlinearities(self.spec.rigid), modes="all")
-        until = min(self.spec.training, bench.t_end)
+        setup = self.setup
+        complete = MultiPhiModel(setup.structure, setup.nonlinearities(self.spec.rigid), modes="all")
+        until = min(self.spec.training, setup.t_end)
         return pod_basis(
-            simulate(complete, until, start=start_equilibrium(bench, complete), loads=bench.loads), self.spec.modes
+            simulate(complete, until, start=start_equilibrium(setup, complete), loads=setup.loads), self.spec.modes
         )

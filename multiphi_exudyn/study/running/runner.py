@@ -15,7 +15,7 @@ import numpy as np
 from multiphi_exudyn.mathematics.compiling.compiled import available, compile_entries
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.running.timing import repeated, timed
-from multiphi_exudyn.study.scene.workbench import Workbench, start_equilibrium
+from multiphi_exudyn.study.scene.workbench import Setup, start_equilibrium
 from reference_models.full_run import ENERGY_GAIN, EnergyBalance
 
 __all__ = ["ENERGY_INTERVAL", "Runner", "modes_text"]
@@ -30,7 +30,7 @@ class Runner(ABC):
     compiled: ClassVar[bool] = False  # whether the solver needs the compiled loop
     may_gain_energy: ClassVar[bool] = False  # whether time integration may gain energy, an error
 
-    bench: Workbench
+    setup: Setup
     spec: Any
     progress: bool = False
     retry: bool = False
@@ -43,8 +43,8 @@ class Runner(ABC):
 
     def prepare(self) -> Any:
         """Do the offline part; by default build the Multi-Phi model and its start equilibrium."""
-        model = self.bench.model(self.spec)
-        return model, start_equilibrium(self.bench, model)
+        model = self.setup.model(self.spec)
+        return model, start_equilibrium(self.setup, model)
 
     @abstractmethod
     def solve(self, prepared: Any) -> tuple[Any, float]:
@@ -60,7 +60,7 @@ class Runner(ABC):
 
     def repeats(self, answer: Any) -> int:
         """Number of timed repeats, more for a short run."""
-        return self.bench.repeats
+        return self.setup.repeats
 
     def run(self) -> ModelRun:
         """Prepare, solve and sample."""
@@ -73,7 +73,7 @@ class Runner(ABC):
             name=self.spec.name,
             kind=self.spec.kind,
             label=self.label,
-            offline_s=self.bench.structure_s + preparation_s,
+            offline_s=self.setup.structure_s + preparation_s,
             first_s=first,
             repeats_s=repeats,
         )
@@ -81,21 +81,21 @@ class Runner(ABC):
         if not run.ok:
             return run
         histories, sampling_s = timed(lambda: self.histories(prepared, answer))
-        fields: dict[str, Any] = {"time": self.bench.time, "sampling_s": sampling_s}
+        fields: dict[str, Any] = {"time": self.setup.time, "sampling_s": sampling_s}
         complete = replace(run, **fields | histories)
         cause = _energy_gain(complete) if self.may_gain_energy else ""
         return replace(run, status="failed", message=cause) if cause else complete
 
     def level_text(self) -> str:
         """Kind of levels, as part of a label."""
-        contacts = self.bench.contacts(self.spec.rigid)
+        contacts = self.setup.contacts(self.spec.rigid)
         if not contacts:
-            return "levels of force laws" if self.bench.mechanics.force_laws else "levels of friction"
+            return "levels of force laws" if self.setup.mechanics.force_laws else "levels of friction"
         return f"{'rigid' if all(contact.rigid for contact in contacts) else 'compliant'} levels"
 
     def printed_text(self) -> str:
         """Note on printed frequencies, as part of a label; else empty."""
-        return ", printed frequencies" if self.bench.overrides else ""
+        return ", printed frequencies" if self.setup.overrides else ""
 
 
 def modes_text(modes: object) -> str:

@@ -15,7 +15,7 @@ from multiphi_exudyn.study.running.reduced_runner import GlobalBasisRunner, Redu
 from multiphi_exudyn.study.running.runner import Runner
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.running.stepwise_runner import SplittingRunner, StepwiseRunner
-from multiphi_exudyn.study.scene.workbench import Workbench
+from multiphi_exudyn.study.scene.workbench import Setup
 from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
 __all__ = ["run_model"]
@@ -32,16 +32,14 @@ RUNNERS: Mapping[str, type[Runner]] = {
 }
 
 
-def run_model(
-    bench: Workbench, name: str, progress: bool = True, retry: bool = False, horizon: bool = False
-) -> ModelRun:
+def run_model(setup: Setup, name: str, progress: bool = True, retry: bool = False, horizon: bool = False) -> ModelRun:
     """Run the scene's model ``name``; a failed run has status "failed" and its cause.
 
     retry: run a failed full beam again with smaller steps and more damping; not for a study of these settings.
     horizon: run a reduced model once more from a perturbed start. Warnings are stored in the run, not issued.
     """
-    spec = bench.scene.models[name]
-    runner = RUNNERS[spec.kind](bench, spec, progress, retry, horizon)
+    spec = setup.scene.models[name]
+    runner = RUNNERS[spec.kind](setup, spec, progress, retry, horizon)
     with kept_back():
         label = runner.label
         try:

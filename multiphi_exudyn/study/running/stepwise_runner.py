@@ -34,8 +34,8 @@ class _StepRunner(Runner):
         return answer.histories
 
     def histories(self, prepared: Any, answer: StepwiseRun | SplittingRun) -> dict[str, Any]:
-        time, t_end, sampler = self.bench.time, self.bench.t_end, self.sampler(answer)
-        histories, sampling = timed(lambda: sampler(self.bench.points, time))
+        time, t_end, sampler = self.setup.time, self.setup.t_end, self.sampler(answer)
+        histories, sampling = timed(lambda: sampler(self.setup.points, time))
         energy_time = np.linspace(0.0, t_end, round(t_end / ENERGY_INTERVAL) + 1)
         forces = histories.contact_force
         return {
@@ -61,7 +61,7 @@ class StepwiseRunner(_StepRunner):
     def solve(self, prepared: tuple[MultiPhiModel, Equilibrium]) -> tuple[StepwiseRun, float]:
         model, start = prepared
         options = {"method": self.spec.method, "rtol": self.spec.rtol}
-        return timed(lambda: solve_stepwise(model, self.bench.t_end, start.displacement, **options))
+        return timed(lambda: solve_stepwise(model, self.setup.t_end, start.displacement, **options))
 
     def outcome(self, prepared: Any, answer: StepwiseRun) -> dict[str, Any]:
         return {
@@ -78,23 +78,23 @@ class SplittingRunner(_StepRunner):
     compiled = True
 
     def sampler(self, answer: Any) -> Callable[[Sequence[str], np.ndarray], StepwiseHistories]:
-        return partial(answer.histories, self.bench.structure)
+        return partial(answer.histories, self.setup.structure)
 
     @property
     def label(self) -> str:
-        modes = f"{self.spec.modes} + {len(self.bench.interface)} modes"
+        modes = f"{self.spec.modes} + {len(self.setup.interface)} modes"
         return f"Strang splitting, {modes}, step {1e6 * self.spec.step:g} us"
 
     def prepare(self) -> tuple[Splitting, np.ndarray]:
-        bench = self.bench
-        contacts = bench.contacts(rigid=False)
-        component = splitting(bench.structure, contacts, bench.interface, self.spec.modes)
-        return component, start_configuration(bench, MultiPhiModel(bench.structure, contacts))
+        setup = self.setup
+        contacts = setup.contacts(rigid=False)
+        component = splitting(setup.structure, contacts, setup.interface, self.spec.modes)
+        return component, start_configuration(setup, MultiPhiModel(setup.structure, contacts))
 
     def solve(self, prepared: tuple[Splitting, np.ndarray]) -> tuple[SplittingRun, float]:
         component, start = prepared
         with np.errstate(over="ignore", invalid="ignore"):
-            return timed(lambda: component.run(start, self.bench.t_end, self.spec.step))
+            return timed(lambda: component.run(start, self.setup.t_end, self.spec.step))
 
     def outcome(self, prepared: tuple[Splitting, np.ndarray], answer: SplittingRun) -> dict[str, Any]:
         return {

@@ -41,7 +41,7 @@ from reference_models.craig_bampton import independent_points
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import published_override
 
-__all__ = ["ELEMENTS", "ROUND_OFF", "Workbench", "mesh_nodes", "prepare", "start_configuration", "start_equilibrium"]
+__all__ = ["ELEMENTS", "ROUND_OFF", "Setup", "mesh_nodes", "prepare", "start_configuration", "start_equilibrium"]
 
 START_TOLERANCE = 1e-13  # of the force, between the last two steps of its iteration
 START_ERROR = 1e-9  # of the prescribed displacement; the same as for full models
@@ -51,7 +51,7 @@ ELEMENTS = 57  # of a beam in a scene without a full model, as in the paper's mo
 
 
 @dataclass(frozen=True)
-class Workbench:
+class Setup:
     """A scene ready to run.
 
     structure: M, C, K and points. structure_s: time to build it [s]. time: (k,) the common grid [s].
@@ -153,7 +153,7 @@ class Workbench:
         return FullBeam(mechanics.beams, mechanics.contacts, settings, mechanics.force_laws, mechanics.frictions)
 
 
-def prepare(scene: Scene, mechanics: Mechanics) -> Workbench:
+def prepare(scene: Scene, mechanics: Mechanics) -> Setup:
     """Build the data that the models of a scene share; raises MultiPhiValueError with file and field."""
     structure, elapsed = mechanics.matrices, 0.0
     if structure is None:
@@ -161,27 +161,27 @@ def prepare(scene: Scene, mechanics: Mechanics) -> Workbench:
         structure = beams.structure
     outputs = scene.file.outputs
     grid = outputs.interval * np.arange(round(outputs.t_end / outputs.interval) + 1)
-    bench = Workbench(scene, mechanics, replace(structure, damping=mechanics.damping), elapsed, grid)
-    _check_modes(bench)
-    inside(f"{scene.path}: structure", lambda: bench.longest_period)  # raises an error for a structure without modes
-    return bench
+    setup = Setup(scene, mechanics, replace(structure, damping=mechanics.damping), elapsed, grid)
+    _check_modes(setup)
+    inside(f"{scene.path}: structure", lambda: setup.longest_period)  # raises an error for a structure without modes
+    return setup
 
 
-def start_configuration(bench: Workbench, model: MultiPhiModel) -> np.ndarray:
+def start_configuration(setup: Setup, model: MultiPhiModel) -> np.ndarray:
     """Static response x (n,) to the scene's start load with the contacts of ``model``; zero without a start load."""
-    return start_equilibrium(bench, model).displacement
+    return start_equilibrium(setup, model).displacement
 
 
-def start_equilibrium(bench: Workbench, model: MultiPhiModel) -> Equilibrium:
+def start_equilibrium(setup: Setup, model: MultiPhiModel) -> Equilibrium:
     """Equilibrium under the scene's start load, applied slowly: displacement and stretches of friction springs."""
-    start = bench.scene.file.start
+    start = setup.scene.file.start
     if start is None:
         stretches = {model.links[k].name: 0.0 for k in model.held}
-        return Equilibrium(np.zeros(bench.structure.n), stretches)
+        return Equilibrium(np.zeros(setup.structure.n), stretches)
     if not isinstance(start, DisplacedStart):
         return model.equilibrium({start.load_at: start.force})
-    row = bench.structure.row(start.measured_at)
-    free = MultiPhiModel(bench.structure, modes=1).static_equilibrium({start.load_at: 1.0})
+    row = setup.structure.row(start.measured_at)
+    free = MultiPhiModel(setup.structure, modes=1).static_equilibrium({start.load_at: 1.0})
     free_force = start.displacement / float(row @ free)
 
     def deviation(share: float) -> float:
@@ -213,29 +213,29 @@ def _mesh(scene: Scene, mechanics: Mechanics) -> Mesh:
     return Mesh.of(mechanics.beams, kind, elements)
 
 
-def _check_modes(bench: Workbench) -> None:
+def _check_modes(setup: Setup) -> None:
     """Check that no model has more modes than the structure."""
-    directions = bench.mechanics.direction_count
-    most = bench.structure.n - directions
+    directions = setup.mechanics.direction_count
+    most = setup.structure.n - directions
     if most < 1:
         raise MultiPhiValueError(
-            f"{bench.scene.path}: structure: got {bench.structure.n} degrees of freedom and {directions} contacts, "
+            f"{setup.scene.path}: structure: got {setup.structure.n} degrees of freedom and {directions} contacts, "
             "frictions or force laws, need more degrees of freedom than those"
         )
-    for model in bench.scene.models.values():
+    for model in setup.scene.models.values():
         if model.kind == "craig-bampton":
-            _check_component(bench, model)
+            _check_component(setup, model)
         elif model.kind != "full" and model.modes not in (None, "all") and int(model.modes) > most:
-            refuse(bench.scene, f"modes of {model.name}", model.modes, f"at most {most} for this structure")
+            refuse(setup.scene, f"modes of {model.name}", model.modes, f"at most {most} for this structure")
 
 
-def _check_component(bench: Workbench, model: CraigBamptonModel) -> None:
+def _check_component(setup: Setup, model: CraigBamptonModel) -> None:
     """Check that every contact acts on an independent point, and the number of modes."""
-    interface = bench.interface
-    missing = [name for name in bench.contact_points if name not in interface]
+    interface = setup.interface
+    missing = [name for name in setup.contact_points if name not in interface]
     if missing:
-        refuse(bench.scene, f"kind of {model.name}", model.kind, f"another: point {missing[0]} follows from the others")
-    most = bench.structure.n - len(interface)
+        refuse(setup.scene, f"kind of {model.name}", model.kind, f"another: point {missing[0]} follows from the others")
+    most = setup.structure.n - len(interface)
     if model.modes > most:
         needed = f"at most {most} beside {len(interface)} interface points"
-        refuse(bench.scene, f"modes of {model.name}", model.modes, needed)
+        refuse(setup.scene, f"modes of {model.name}", model.modes, needed)

@@ -89,11 +89,11 @@ from multiphi_exudyn.events.arrays import (
     WORKED,
     WORKING,
 )
-from multiphi_exudyn.events.law.bounces import only_bounces
+from multiphi_exudyn.events.law.bounces import is_rebound_only
 from multiphi_exudyn.events.law.changes import clear
 from multiphi_exudyn.events.law.decision import decide, decide_jump
 from multiphi_exudyn.events.law.first_state import begin
-from multiphi_exudyn.events.law.monitoring import arm, flag_again, watch, who_asks
+from multiphi_exudyn.events.law.monitoring import arm, collect_requests, flag_repeated_requests, watch
 from multiphi_exudyn.events.states.channel_values import keep_drive, load_piece, piece_end, set_drive
 from multiphi_exudyn.events.states.defect_sums import add_defect, add_start_defect
 from multiphi_exudyn.events.states.energies import energy, kinetic, pattern_work, potential, strain
@@ -291,7 +291,7 @@ def advance_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> i
             elapsed = horizon
             break
         elapsed = numbers[ints[FOUND]]
-        decision_due = who_asks(ints, numbers, waves, count, signal, elapsed)
+        decision_due = collect_requests(ints, numbers, waves, count, signal, elapsed)
         if decision_due == 0:
             arm(ints, ints[ints[WAITING] + 2 * signal])
             armed_at = elapsed
@@ -308,7 +308,7 @@ def advance_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> i
     sample_motion_size(ints, numbers, waves)
     status = OK
     if decision_due > 0:
-        flag_again(ints, 1 if at_once and ints[WHOLE] == 0 else 0)
+        flag_repeated_requests(ints, 1 if at_once and ints[WHOLE] == 0 else 0)
         status = decide(ints, numbers, waves)
     else:
         ints[CHANGE_COUNT] = 0
@@ -337,7 +337,7 @@ def apply_decision(ints: Ints, numbers: Numbers, level: int, status: int) -> int
     numbers[last] = numbers[LAST_DECISION]
     numbers[last + 1] = numbers[ints[level + HIGHEST_FREQUENCY]]
     numbers[LAST_DECISION] = numbers[TIME]
-    ints[DECISIONS] += 1 - only_bounces(ints, numbers)  # a sequence of bounces ends by itself
+    ints[DECISIONS] += 1 - is_rebound_only(ints, numbers)  # a sequence of bounces ends by itself
     ints[TRANSITIONS] += ints[TRANSITIONS_NOW]
     if status < 0:
         copy_state(ints, numbers, REACHED, CURRENT)

@@ -32,7 +32,7 @@ from multiphi_exudyn.events.arrays import (
     TIME,
 )
 from multiphi_exudyn.events.states.energies import energy
-from multiphi_exudyn.events.states.flow import state_at, step_on
+from multiphi_exudyn.events.states.flow import next_state, state_at
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.response.basis_arrays import PURE
 
@@ -94,7 +94,7 @@ def sample_motion_size(ints: Ints, numbers: Numbers, waves: Waves) -> None:
         weight = 1.0 if numbers[SEEN] > 0 and not last else 0.5
         if samples_here > 0 and ints[ints[FLOW_BASIS] + PURE] == 1:
             step, again = (end - first) / (SAMPLES - 1), 1 if samples_here > 1 else 0
-            step_on(ints, numbers, waves, level, step, again, ints[AFTER + PLACE], ints[AFTER + SPEED])
+            next_state(ints, numbers, waves, level, step, again, ints[AFTER + PLACE], ints[AFTER + SPEED])
             add_sample(ints, numbers, level, weight)
         else:
             add_sample_at(ints, numbers, waves, level, t - numbers[TIME], weight)

@@ -199,7 +199,7 @@ class _Worker:
     def motion(self, levels: LoadedLevels, start: Start, compiled: bool | None) -> Motion:
         """Return a motion on the thread's arrays."""
         motion = Motion(self._arrays.get_or_build(levels, lambda: _roomy(levels)), start, compiled, self.loop)
-        motion.sums_works = False  # no ledger is made
+        motion.is_summing_works = False  # no ledger is made
         return motion
 
     def loop(self, *given: Any) -> Any:

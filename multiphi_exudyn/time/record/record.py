@@ -70,7 +70,7 @@ class Record:
         """Move the loop's segments and events from its arrays to this record."""
         self.append(copy_record(self.arrays, PARTS))
 
-    def take_events(self) -> None:
+    def collect_events(self) -> None:
         """Move the loop's events from its arrays to this record, and drop its segments."""
         self.append(copy_record(self.arrays, EVENTS))
 
@@ -248,7 +248,7 @@ class Record:
 
     def _record_arguments(self, offsets: np.ndarray) -> tuple[np.ndarray, ...]:
         """First arguments of every compiled function of sampling.py and work.py."""
-        return *self.arrays.lent(int(self.rows[-1, 1])), self.rows.ravel(), self.coordinates, offsets
+        return *self.arrays.borrow_buffers(int(self.rows[-1, 1])), self.rows.ravel(), self.coordinates, offsets
 
     def _supply(self, answer: int) -> bool:
         """Supply what a compiled function needs; return whether it is to be called again."""
@@ -262,7 +262,7 @@ class Record:
         armed = (Phase.ARMED,) * len(exits_of(level))
         return armed if start < 0 else tuple(PHASES[k] for k in self.phases[start : start + len(armed)])
 
-    def standings(self) -> np.ndarray:
+    def start_phases(self) -> np.ndarray:
         """Phases (n, e), in numbers, at the start of every segment; e: largest number of exits of a level."""
         counts = np.array([len(exits_of(level)) for level in self.levels], np.int64)[self.rows[:, 0]]
         numbers, starts = np.zeros((len(self.rows), int(np.max(counts, initial=0))), np.int64), self.rows[:, 3]

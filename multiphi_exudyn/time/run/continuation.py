@@ -22,7 +22,7 @@ from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.transitions.state import State
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
-__all__ = ["continued_start", "stops_moved", "with_final_velocity"]
+__all__ = ["continued_start", "stop_displacements", "with_final_velocity"]
 
 CONTINUOUS = 1e-9  # of the position of a stop: a smaller difference is within the accuracy of its motion
 
@@ -34,7 +34,7 @@ def continued_start(trajectory: Trajectory, levels: LoadedLevels, rewound: bool 
     before, r = state.level, _mode_count(state.level)
     level, held_links, held = levels.level(before.states), list(model.held), state.held
     prescribed, rates = levels.drive.values[:2]
-    stops_before, stops_now = stops_moved(state), level.excitation.moved(prescribed)
+    stops_before, stops_now = stop_displacements(state), level.excitation.moved(prescribed)
     if rewound:
         held = held + (stops_before - stops_now)[held_links]
         stops_before[held_links] = stops_now[held_links]
@@ -70,7 +70,7 @@ def with_final_velocity(trajectory: Trajectory, velocity: np.ndarray) -> Traject
     return trajectory.ending_in(replace(state, velocity=np.concatenate([modal_velocity, state.velocity[r:]])))
 
 
-def stops_moved(state: State) -> np.ndarray:
+def stop_displacements(state: State) -> np.ndarray:
     """Displacements (c,) [m] of stops and counter-surfaces in a state."""
     r, excitation = _mode_count(state.level), state.level.excitation
     return excitation.moved(state.displacement[r : r + excitation.prescribed])

@@ -41,8 +41,8 @@ class Motion:
     """A run in progress on ``arrays``, which may have belonged to another run before; collects segments and events.
 
     compiled: False for the loop as plain Python. loop: a function to call in its place. time: present time [s].
-    message: cause of a failure, or "". sums_works: whether the loop sums the works of segments for a ledger; otherwise
-    they are integrated when a ledger is made. The run begins with ``process_start`` or ``advance``.
+    message: cause of a failure, or "". is_summing_works: whether the loop sums the works of segments for a ledger;
+    otherwise they are integrated when a ledger is made. The run begins with ``process_start`` or ``advance``.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class Motion:
         self._window, self._allowed = limits(self.model)
         ending = FinalState(self._initial_numbers(start.time), self.record)
         self._final = ending if start.state is None else ending.at(start.state)
-        self._starting = self.sums_works = True
+        self._starting = self.is_summing_works = True
         self._unavailable: Exception | None = None
 
     def _initial_numbers(self, time: float) -> np.ndarray:
@@ -96,7 +96,7 @@ class Motion:
         """Events so far."""
         return Events(self.record, self._final.numbers[a.LOST_SO_FAR : a.LOST_SO_FAR + a.LOSSES])
 
-    def go_on_from(self, state: State, time: float) -> None:
+    def continue_from(self, state: State, time: float) -> None:
         """Drop the collected segments and events, and continue from a state and a time [s]."""
         self.time, self.message, self._starting = time, "", False
         self.record = Record(self.model.contacts, self.arrays)
@@ -235,7 +235,7 @@ class Motion:
             arrays.ints[a.STARTING] = a.GOING_ON if self._starting else 0
         ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
         ints[a.TRANSITIONS], ints[a.GIVEN_UP] = ending.transitions, 0
-        ints[a.WORKING] = int(self.sums_works)
+        ints[a.WORKING] = int(self.is_summing_works)
         numbers[a.TIME], numbers[ints[a.FOUND] + 1] = self.time, ending.evaluations
 
     def _read_arrays(self) -> None:

@@ -55,7 +55,7 @@ class _Scales:
         model, base, excitation = levels.model, levels.model.base, levels.excitation
         omega, sizes = base.modes.omega, np.linalg.norm(base.directions, axis=0)
         times = np.minimum(np.divide(1.0, omega, out=np.full(len(omega), end), where=omega > 0), end)
-        gap_terms = base.magnitudes[1] + excitation.stop_ways
+        gap_terms = base.magnitudes[1] + excitation.stop_travel
         gaps = np.divide(gap_terms, sizes, out=np.zeros(len(gap_terms)), where=sizes > 0)
         others = np.where(np.isinf(base.stiffnesses), np.max(gaps, initial=0.0), 0.0)
         lengths = float(np.linalg.norm(excitation.largest_load * times**2)) + others
