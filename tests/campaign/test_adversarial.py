@@ -21,7 +21,7 @@ from multiphi_exudyn.mathematics.search.zero_crossing import NONE, first_descent
 from multiphi_exudyn.study.stability.run_laws import complaints, missed
 from multiphi_exudyn.study.stability.run_signals import Signal
 from multiphi_exudyn.time.loop import loop
-from multiphi_exudyn.time.segments.segment import Listed
+from multiphi_exudyn.time.segments.segment import SegmentList
 
 DISTINCT = ("chain", "free chain", "dense", "wide")  # frequencies: of repeated ones a truncated basis may keep any
 DENSE = 1e4  # samples of the shortest period
@@ -331,7 +331,7 @@ class TestTheChecksSee:
         )
         slower = dataclasses.replace(run.start, velocity=0.9 * run.start.velocity)
         for wrong, complaint in (
-            ({"segments": Listed([weaker, *others])}, "energy: rises"),
+            ({"segments": SegmentList([weaker, *others])}, "energy: rises"),
             ({"start": slower}, "ledger: residual"),
         ):
             found = complaints(dataclasses.replace(run, **wrong))

@@ -269,12 +269,12 @@ def test_a_missing_cluster_package_is_named(refused, monkeypatch):
     )
 
 
-def test_an_address_nobody_answers_at_is_named(refused, monkeypatch):
+def test_an_address_without_an_answer_is_named(refused, monkeypatch):
     monkeypatch.setattr("multiphi_exudyn.study.sweep.executors.ANSWER_S", 0.5)
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
-        refused(ValueError, f"where: nobody answers at {address}", open_executor(address).__enter__)
+        refused(ValueError, f"where: no answer at {address}", open_executor(address).__enter__)
 
 
 @pytest.fixture

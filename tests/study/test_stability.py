@@ -20,7 +20,7 @@ from multiphi_exudyn.study.stability.native_run import run_native
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
 from multiphi_exudyn.study.stability.report import render_stability, text_table
 from multiphi_exudyn.study.stability.summary import contents, failures, summaries
-from multiphi_exudyn.time.segments.segment import Listed
+from multiphi_exudyn.time.segments.segment import SegmentList
 from reference_models.full_matrices import run_matrices
 
 BUDGET = 20_000
@@ -88,7 +88,7 @@ class TestTheJudgeSees:
         problem, trajectory = honest
         first = trajectory.segments[0]
         passed = dataclasses.replace(first, end=trajectory.t_end)
-        through = dataclasses.replace(trajectory, segments=Listed((passed,)), events=())
+        through = dataclasses.replace(trajectory, segments=SegmentList((passed,)), events=())
         assert judge(problem, through, BUDGET).missed >= 1
 
     def test_an_energy_that_nobody_gave(self, honest):
@@ -113,7 +113,7 @@ class TestTheJudgeSees:
         trajectory = simulate(problem.model(), 4.0, problem.displacement)
         assert complaints(problem, trajectory) == ""
         pulled = [dataclasses.replace(s, level=_with_forces(s.level, -1.0)) for s in trajectory.segments]
-        assert "pulls" in complaints(problem, dataclasses.replace(trajectory, segments=Listed(pulled)))
+        assert "pulls" in complaints(problem, dataclasses.replace(trajectory, segments=SegmentList(pulled)))
 
 
 class TestTheJudgeKnowsFriction:
@@ -168,7 +168,7 @@ class TestTheJudgeKnowsLaws:
         i = next(i for i, s in enumerate(trajectory.segments) if s.level.level.indices and s.end < trajectory.t_end)
         held = dataclasses.replace(trajectory.segments[i], end=trajectory.segments[i + 1].end)
         segments = (*trajectory.segments[:i], held, *trajectory.segments[i + 2 :])
-        told = complaints(problem, dataclasses.replace(trajectory, segments=Listed(segments)))
+        told = complaints(problem, dataclasses.replace(trajectory, segments=SegmentList(segments)))
         assert "a contact pulls" in told
 
     def test_of_a_force_law_whose_springs_are_not_its_own(self):
