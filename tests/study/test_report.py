@@ -92,6 +92,7 @@ def text_of(page):
 
 def test_the_first_lines_give_the_errors_times_and_doubts(comparison):
     found = findings(comparison)
+    assert not [text for texts in found.values() for text in texts if re.search(r"[a-z)]\.[A-Z]", text)]
     compared, outcome, doubts = (" ".join(found[part]) for part in ("compared", "outcome", "distrust"))
     assert "deflects tip by +10 mm" in compared
     assert "stop (gap 1 mm, 100 kN/m)" in compared
