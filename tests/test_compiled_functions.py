@@ -10,6 +10,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import FunctionType
 
 import numpy as np
 import pytest
@@ -323,6 +324,7 @@ def test_a_damaged_file_is_compiled_again(made, damage):
 def two_processes(monkeypatch):
     """Work that is shared between two processes, however little it is."""
     monkeypatch.setattr(compilation, "WORTH_A_PROCESS", 0.01)
+    monkeypatch.setattr(compilation, "PROCESS_START", 0.0)
     monkeypatch.setattr(compilation, "_most_processes", lambda: 2)
 
 
@@ -336,6 +338,18 @@ def test_processes_share_out_functions_by_their_work():
     assert compilation.work_shares([square, turn, total]) == [[total], [turn, square]]
     assert compilation.compile_in_process([turn, square]).keys() == {turn, square}
     assert Entry(total)(*buffers(), 4, 1.5) == pytest.approx(total(*buffers(), 4, 1.5), rel=1e-15)
+
+
+def test_sharing_out_costs_a_look_at_every_function(monkeypatch):
+    looked_at = []
+    monkeypatch.setattr(compilation, "line_count", lambda function: looked_at.append(function) or 100)
+    monkeypatch.setattr(compilation, "_most_processes", lambda: 2)
+    compilation._seconds.cache_clear()
+    functions = [FunctionType((lambda: 0).__code__, {}) for _ in range(40)]
+    own_share, other_share = compilation.work_shares(functions)
+    assert len(looked_at) == 40
+    assert len(other_share) < len(own_share) < 40  # another process has to start first
+    compilation._seconds.cache_clear()
 
 
 @pytest.mark.usefixtures("two_processes")

@@ -8,6 +8,7 @@ function needs are run (translation.py), and LLVM optimises it once: a third of 
 
 from __future__ import annotations
 
+import functools
 import gc
 import os
 import pickle
@@ -26,7 +27,8 @@ from multiphi_exudyn.mathematics.compiling.translation import object_file_of
 __all__ = ["compile_functions", "compile_in_process", "expected_seconds", "run_worker", "work_shares"]
 
 START, EACH_FUNCTION, EACH_LINE = 2.0, 0.012, 0.0024  # s, on one core of 2020 that has nothing else to do
-WORTH_A_PROCESS = 4.0  # s of work; a process takes 1 to 2 s to start
+PROCESS_START = 1.0  # s
+WORTH_A_PROCESS = 4.0  # s of work
 MOST_PROCESSES = 4  # of some 250 MB each
 WORKER = "from multiphi_exudyn.mathematics.compiling.compilation import run_worker; run_worker()"
 
@@ -45,9 +47,11 @@ def compile_functions(functions: Sequence[FunctionType]) -> list[bytes]:
 
 def expected_seconds(functions: Sequence[FunctionType]) -> float:
     """Return about how long [s] it takes to compile functions."""
-    return START + max(sum(map(_seconds, share)) for share in work_shares(functions))
+    own_share, *_ = work_shares(functions)
+    return START + sum(map(_seconds, own_share))
 
 
+@functools.cache
 def _seconds(function: FunctionType) -> float:
     return EACH_FUNCTION + EACH_LINE * line_count(function)
 
@@ -61,10 +65,13 @@ def _most_processes() -> int:
 def work_shares(functions: Sequence[FunctionType]) -> list[list[FunctionType]]:
     """Return functions in shares of about equal work, one for each process that is worth its start."""
     count = max(1, min(_most_processes(), int(sum(map(_seconds, functions)) / WORTH_A_PROCESS)))
-    found: list[list[FunctionType]] = [[] for _ in range(count)]
+    shares: list[list[FunctionType]] = [[] for _ in range(count)]
+    seconds = [0.0] + [PROCESS_START] * (count - 1)
     for function in sorted(functions, key=_seconds, reverse=True):
-        min(found, key=lambda share: sum(map(_seconds, share))).append(function)
-    return found
+        least = seconds.index(min(seconds))
+        shares[least].append(function)
+        seconds[least] += _seconds(function)
+    return shares
 
 
 def compile_in_process(functions: Sequence[FunctionType]) -> dict[FunctionType, bytes]:
