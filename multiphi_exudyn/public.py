@@ -13,22 +13,22 @@ from multiphi_exudyn.levels.level_override import LevelOverride
 from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
-from multiphi_exudyn.mechanics.assembly import Assembly, assemble
-from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass
-from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.force_law import ForceLaw
-from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.loads import FunctionLoad, HarmonicLoad, SampledLoad, SweepLoad
-from multiphi_exudyn.mechanics.matrix_files import read_structure
-from multiphi_exudyn.mechanics.modal_structure import ModalStructure, structure_from_modes
-from multiphi_exudyn.mechanics.moving_supports import BaseMotion, StopMotion
-from multiphi_exudyn.mechanics.planar_beam import planar_beam
-from multiphi_exudyn.mechanics.samples import Sampled
-from multiphi_exudyn.mechanics.section import Section
-from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
-from multiphi_exudyn.mechanics.structure import LinearStructure
-from multiphi_exudyn.mechanics.time_functions import Harmonic, Smooth, Sweep
+from multiphi_exudyn.mechanics.beams.beam import Beam, Clamp, PointMass
+from multiphi_exudyn.mechanics.beams.planar_beam import planar_beam
+from multiphi_exudyn.mechanics.beams.section import Section
+from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
+from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
+from multiphi_exudyn.mechanics.elements.friction import Friction
+from multiphi_exudyn.mechanics.files.matrix_files import read_structure
+from multiphi_exudyn.mechanics.loads.loads import FunctionLoad, HarmonicLoad, SampledLoad, SweepLoad
+from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion
+from multiphi_exudyn.mechanics.loads.samples import Sampled
+from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
+from multiphi_exudyn.mechanics.loads.time_functions import Harmonic, Smooth, Sweep
+from multiphi_exudyn.mechanics.structures.assembly import Assembly, assemble
+from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.structures.modal_structure import ModalStructure, structure_from_modes
+from multiphi_exudyn.mechanics.structures.structure import LinearStructure
 from multiphi_exudyn.steady.frequency_response import FrequencyResponse, frequency_response
 from multiphi_exudyn.steady.settled_state import SteadyState
 from multiphi_exudyn.steady.steady_state import steady_state

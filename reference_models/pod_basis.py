@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.mechanics.structures.structure import LinearStructure
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from reference_models.projection import projected
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 from multiphi_exudyn.exudyn_plugin.body.binding import bind
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.body.create import CreateMultiPhiBody
-from multiphi_exudyn.exudyn_plugin.body.drawing import Drawing
-from multiphi_exudyn.exudyn_plugin.body.sensors import BodyHistories, body_histories
-from multiphi_exudyn.exudyn_plugin.body.solving import install_checks
+from multiphi_exudyn.exudyn_plugin.body.results.drawing import Drawing
+from multiphi_exudyn.exudyn_plugin.body.results.sensors import BodyHistories, body_histories
+from multiphi_exudyn.exudyn_plugin.body.solver.solving import install_checks
 from multiphi_exudyn.exudyn_plugin.convert.fem_interface import linear_structure_from_fem
 from multiphi_exudyn.exudyn_plugin.convert.items import Item
 from multiphi_exudyn.exudyn_plugin.convert.linearize import linear_structure_from

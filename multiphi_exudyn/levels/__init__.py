@@ -9,7 +9,8 @@ equilibria. Where the equations are stated:
     (38.4)  x = Phi_l eta + x_inf,l                       level.Level.asymptotic
     (38.5)  x_inf,l of gaps and loads                     static_response.static_response
 
-Their solution in time is mathematics/free_response.py, of loads that vary mathematics/forced_response.py.
+Their solution in time is mathematics/response/free_response.py, of loads that vary
+mathematics/response/forced_response.py.
 
 Order: closed_directions, modal_base, build_base, static_response, level_modes, mode_figure, level_override, level,
 build_level, sliding, sliding_equilibrium, static_equilibrium, equilibrium_under_forces, mode_choice, level_store,

@@ -31,7 +31,7 @@ from multiphi_exudyn.mathematics.eigenproblems.modes import NEAR
 from multiphi_exudyn.mathematics.response.coupled_response import modal_response
 from multiphi_exudyn.mathematics.response.free_response import ModalResponse, is_slow
 from multiphi_exudyn.mathematics.round_off import ZERO
-from multiphi_exudyn.mechanics.arguments import real_array
+from multiphi_exudyn.mechanics.structures.arguments import real_array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,8 +14,8 @@ from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.mode_choice import FIRST
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.eigenproblems.lowest_modes import missing_flexibility
-from multiphi_exudyn.mechanics.element import Element
-from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.mechanics.elements.element import Element
+from multiphi_exudyn.mechanics.structures.structure import LinearStructure
 
 __all__ = ["LevelStore"]
 

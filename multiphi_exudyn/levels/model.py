@@ -21,8 +21,8 @@ from multiphi_exudyn.levels.shared_base import SharedBase
 from multiphi_exudyn.levels.sliding import with_sliding
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mechanics.element import Element
-from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.mechanics.elements.element import Element
+from multiphi_exudyn.mechanics.structures.structure import LinearStructure
 
 __all__ = ["MultiPhiModel"]
 

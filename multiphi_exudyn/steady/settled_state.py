@@ -12,10 +12,10 @@ import numpy as np
 
 from multiphi_exudyn.display import Shown, kinds
 from multiphi_exudyn.errors import MultiPhiTypeError
-from multiphi_exudyn.mechanics.loads import HarmonicLoad
-from multiphi_exudyn.mechanics.moving_supports import BaseMotion
-from multiphi_exudyn.mechanics.structure import At
-from multiphi_exudyn.mechanics.time_functions import Harmonic
+from multiphi_exudyn.mechanics.loads.loads import HarmonicLoad
+from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion
+from multiphi_exudyn.mechanics.loads.time_functions import Harmonic
+from multiphi_exudyn.mechanics.structures.structure import At
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["HIGHEST_ORDER", "SAMPLES", "PeriodicLoad", "SteadyState", "course_of", "frequency"]

@@ -23,9 +23,9 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
-from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.loads import HarmonicLoad
-from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity, StaticLoad
+from multiphi_exudyn.mechanics.loads.loads import HarmonicLoad
+from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity, StaticLoad
+from multiphi_exudyn.mechanics.structures.arguments import is_real
 from multiphi_exudyn.steady.settled_state import PeriodicLoad, SteadyState, course_of, frequency
 from multiphi_exudyn.steady.settling import CHUNK, Search, with_warnings
 from multiphi_exudyn.steady.shooting import PeriodMap

@@ -21,8 +21,8 @@ from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
 from multiphi_exudyn.mathematics.compiling.compiled import available
-from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.loads import Load, patterns, unchanging
+from multiphi_exudyn.mechanics.loads.loads import Load, patterns, unchanging
+from multiphi_exudyn.mechanics.structures.arguments import is_real
 from multiphi_exudyn.time.reliability.run_warnings import warnings_of
 from multiphi_exudyn.time.reliability.truncation import run_with_enough_modes
 from multiphi_exudyn.time.run.continuation import continued_start, with_final_velocity

@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 import multiphi_exudyn as mp
 from multiphi_exudyn.events.transitions.exit_table import ExitTable
 from multiphi_exudyn.events.transitions.exits import ExitShares
-from multiphi_exudyn.mechanics.element import link_indices
+from multiphi_exudyn.mechanics.elements.element import link_indices
 
 ELEMENTS = [
     mp.UnilateralContact("soft", "p", 1e-3, 1e4),

@@ -32,8 +32,8 @@ HEAVY = {
     "llvmlite": COMPILERS,
     "distributed": ("multiphi_exudyn/study/sweep",),
     "tqdm": (*(f"multiphi_exudyn/{room}" for room in ("mathematics", "time", "study", "cli")), "reference_models"),
-    "h5py": ("multiphi_exudyn/mechanics/array_files.py",),
-    "pyyeti": ("multiphi_exudyn/mechanics/array_files.py",),
+    "h5py": ("multiphi_exudyn/mechanics/files/array_files.py",),
+    "pyyeti": ("multiphi_exudyn/mechanics/files/array_files.py",),
 }
 WITH_NUMBA = (  # may be imported inside a function, as numba may
     "multiphi_exudyn.mathematics.compiling.compilation",
@@ -209,6 +209,6 @@ def test_the_package_shows_its_public_names_and_its_rooms_and_no_others():
     assert set(public.__all__) <= set(dir(mp))
     assert mp.__all__ == public.__all__
     assert all(getattr(mp, name) is getattr(public, name) for name in public.__all__)
-    assert mp.mechanics.planar_beam.planar_beam is mp.planar_beam
+    assert mp.mechanics.beams.planar_beam.planar_beam is mp.planar_beam
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):
         _ = mp.simulat

@@ -12,9 +12,9 @@ from small_structures import bed
 from multiphi_exudyn import LinearStructure, MultiPhiModel, UnilateralContact, simulate
 from multiphi_exudyn.levels.build_level import build_level
 from multiphi_exudyn.mathematics.eigenproblems.modes import right_singular_vectors
-from multiphi_exudyn.mechanics.beam import Beam
-from multiphi_exudyn.mechanics.planar_beam import planar_beam
-from multiphi_exudyn.mechanics.section import Section
+from multiphi_exudyn.mechanics.beams.beam import Beam
+from multiphi_exudyn.mechanics.beams.planar_beam import planar_beam
+from multiphi_exudyn.mechanics.beams.section import Section
 from multiphi_exudyn.study.stability.run_laws import complaints
 
 FREQUENCIES = 1e-12  # relative, between two routes to the same modes

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from multiphi_exudyn import MultiPhiError, MultiPhiModel, MultiPhiTypeError, MultiPhiValueError, read_structure
-from multiphi_exudyn.mechanics.matrix_files import read_array
+from multiphi_exudyn.mechanics.files.matrix_files import read_array
 
 N = 5
 MASS = scipy.sparse.csc_array(np.diag(np.arange(1.0, N + 1)))
@@ -239,7 +239,8 @@ def test_reading_output4_leaves_how_numbers_are_printed(tmp_path):
     """In a process of its own: importing its reader changes NumPy's print options."""
     file = write_several(tmp_path / "m.op4", {"m": np.eye(2)})
     code = (
-        "import numpy as np; from pathlib import Path; from multiphi_exudyn.mechanics.array_files import op4_arrays\n"
+        "import numpy as np; from pathlib import Path\n"
+        "from multiphi_exudyn.mechanics.files.array_files import op4_arrays\n"
         f"op4_arrays(Path({str(file)!r})); print(str(np.float64(1) / 3))"
     )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

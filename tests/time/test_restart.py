@@ -25,7 +25,7 @@ from multiphi_exudyn import (
     UnilateralContact,
     simulate,
 )
-from multiphi_exudyn.mechanics.time_functions import Harmonic
+from multiphi_exudyn.mechanics.loads.time_functions import Harmonic
 
 
 @settings(derandomize=True, max_examples=15, deadline=None)

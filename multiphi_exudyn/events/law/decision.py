@@ -165,7 +165,7 @@ from multiphi_exudyn.events.law.switching import switch
 from multiphi_exudyn.events.states.signals import row_sign
 from multiphi_exudyn.events.states.state_arrays import clear_turning_speeds, copy_state, same_level
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, TAKEN_FALLING, TAKEN_ONCE
+from multiphi_exudyn.mechanics.elements.element import ALWAYS_TAKEN, TAKEN_FALLING, TAKEN_ONCE
 
 __all__ = ["ROUNDS", "decide", "decide_jump"]
 

@@ -49,7 +49,7 @@ from multiphi_exudyn.events.states.flow import expand, signal_sizes, signal_wave
 from multiphi_exudyn.events.states.signals import held_part, mapped_terms, rate_sign, row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.search.zero_crossing import first_sign
-from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN, MAY_RECOVER, TAKEN_ONCE
+from multiphi_exudyn.mechanics.elements.element import ALWAYS_TAKEN, MAY_RECOVER, TAKEN_ONCE
 
 __all__ = [
     "arm_return_exits",

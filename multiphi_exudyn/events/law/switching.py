@@ -35,7 +35,7 @@ from multiphi_exudyn.events.law.redundancy import drop_redundant_stick
 from multiphi_exudyn.events.law.resting import same_speed
 from multiphi_exudyn.events.states.signals import row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN
+from multiphi_exudyn.mechanics.elements.element import ALWAYS_TAKEN
 
 __all__ = ["open_and_enter", "switch"]
 

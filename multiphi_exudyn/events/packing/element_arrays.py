@@ -10,9 +10,9 @@ from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
-from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.element import friction_spring
-from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
+from multiphi_exudyn.mechanics.elements.element import friction_spring
+from multiphi_exudyn.mechanics.elements.friction import Friction
 
 __all__ = ["describe_elements"]
 

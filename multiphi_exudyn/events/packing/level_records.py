@@ -22,7 +22,7 @@ from multiphi_exudyn.mathematics.compiling.compiled import entry
 from multiphi_exudyn.mathematics.response import response_arrays
 from multiphi_exudyn.mathematics.response.basis_arrays import describe_basis
 from multiphi_exudyn.mathematics.response.exponentials import Exponentials
-from multiphi_exudyn.mechanics.element import Exit, Share
+from multiphi_exudyn.mechanics.elements.element import Exit, Share
 
 __all__ = ["put_base", "put_level", "put_powers", "put_signal", "put_sizes", "put_strain"]
 

@@ -26,7 +26,7 @@ from multiphi_exudyn.events.arrays import (
 from multiphi_exudyn.events.states.state_arrays import accelerate, acceleration_sizes
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.round_off import ZERO
-from multiphi_exudyn.mechanics.element import ALWAYS_TAKEN
+from multiphi_exudyn.mechanics.elements.element import ALWAYS_TAKEN
 
 __all__ = ["gap", "held_part", "mapped_terms", "rate_sign", "row_sign", "sign_of"]
 

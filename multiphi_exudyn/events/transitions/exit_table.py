@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from multiphi_exudyn.events.transitions.exits import ExitShares
-from multiphi_exudyn.mechanics.element import Element, Exit, link_indices
+from multiphi_exudyn.mechanics.elements.element import Element, Exit, link_indices
 
 __all__ = ["ExitTable"]
 

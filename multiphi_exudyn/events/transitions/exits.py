@@ -16,7 +16,7 @@ from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import Row
 from multiphi_exudyn.events.transitions.transition import Transition
 from multiphi_exudyn.mathematics.round_off import drop_round_off, sign_of
-from multiphi_exudyn.mechanics.element import ElementState, Exit
+from multiphi_exudyn.mechanics.elements.element import ElementState, Exit
 
 __all__ = [
     "ExitShares",

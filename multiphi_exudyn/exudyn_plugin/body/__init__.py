@@ -4,7 +4,5 @@ A body on which nothing of the system acts follows a motion that is computed in 
 after every step: if an event may have occurred, the step is computed again exactly, from event to event. One PostStep
 function handles the events of all bodies of a system.
 
-Order: switching, run_record, level_data, coordinates, run_checks, undisturbed_steps, known_motion, certified_step,
-own_loads, event_steps, run_ahead, start_state, surroundings, exact_step, step_by_step, body, reconstruction,
-sensors, drawing, binding, solving, create.
+Order: state, solver, stepping, ahead, body, results, binding, create.
 """

@@ -26,20 +26,20 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.events.transitions.state import Event, Loss, State, total_loss
-from multiphi_exudyn.exudyn_plugin.body.coordinates import SAME_STEP, Coordinates
-from multiphi_exudyn.exudyn_plugin.body.known_motion import KnownMotion
-from multiphi_exudyn.exudyn_plugin.body.level_data import LevelData
-from multiphi_exudyn.exudyn_plugin.body.own_loads import OwnLoads
-from multiphi_exudyn.exudyn_plugin.body.run_ahead import RunAhead
-from multiphi_exudyn.exudyn_plugin.body.run_checks import check_integration, check_matched, check_start
-from multiphi_exudyn.exudyn_plugin.body.run_record import RunRecord
-from multiphi_exudyn.exudyn_plugin.body.start_state import start_state
-from multiphi_exudyn.exudyn_plugin.body.step_by_step import StepwiseRun
-from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of, is_isolated, running_solver
+from multiphi_exudyn.exudyn_plugin.body.ahead.known_motion import KnownMotion
+from multiphi_exudyn.exudyn_plugin.body.ahead.run_ahead import RunAhead
+from multiphi_exudyn.exudyn_plugin.body.solver.run_checks import check_integration, check_matched, check_start
+from multiphi_exudyn.exudyn_plugin.body.solver.switching import bodies_of, is_isolated, running_solver
+from multiphi_exudyn.exudyn_plugin.body.state.coordinates import SAME_STEP, Coordinates
+from multiphi_exudyn.exudyn_plugin.body.state.level_data import LevelData
+from multiphi_exudyn.exudyn_plugin.body.state.run_record import RunRecord
+from multiphi_exudyn.exudyn_plugin.body.stepping.own_loads import OwnLoads
+from multiphi_exudyn.exudyn_plugin.body.stepping.start_state import start_state
+from multiphi_exudyn.exudyn_plugin.body.stepping.step_by_step import StepwiseRun
 from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import ExactMotion
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.mechanics.loads.loads import Load
 from multiphi_exudyn.time.reliability.run_warnings import warnings_of_body
 from multiphi_exudyn.time.run.motion import Motion, motion_of
 

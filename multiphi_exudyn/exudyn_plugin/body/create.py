@@ -13,19 +13,19 @@ from exudyn.itemInterface import NodeGenericData, NodeGenericODE2, ObjectGeneric
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
-from multiphi_exudyn.exudyn_plugin.body.coordinates import matrices
-from multiphi_exudyn.exudyn_plugin.body.drawing import Drawing, check_drawing, graphics_of
-from multiphi_exudyn.exudyn_plugin.body.sensors import add_sensors
-from multiphi_exudyn.exudyn_plugin.body.switching import bodies_of
+from multiphi_exudyn.exudyn_plugin.body.results.drawing import Drawing, check_drawing, graphics_of
+from multiphi_exudyn.exudyn_plugin.body.results.sensors import add_sensors
+from multiphi_exudyn.exudyn_plugin.body.solver.switching import bodies_of
+from multiphi_exudyn.exudyn_plugin.body.state.coordinates import matrices
 from multiphi_exudyn.exudyn_plugin.coupling.interface import Interface
 from multiphi_exudyn.exudyn_plugin.coupling.interface_nodes import InterfaceNode, InterfacePoint, interface_nodes
 from multiphi_exudyn.levels.mode_choice import Tolerance
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.levels.static_equilibrium import Equilibrium
-from multiphi_exudyn.mechanics.arguments import is_real
-from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.loads import Load
-from multiphi_exudyn.mechanics.static_loads import ConstantLoad, Gravity
+from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
+from multiphi_exudyn.mechanics.loads.loads import Load
+from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
+from multiphi_exudyn.mechanics.structures.arguments import is_real
 from multiphi_exudyn.time.run.motion import Motion
 from multiphi_exudyn.time.simulate import Run, base_warnings_of, holding, started
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory

@@ -19,7 +19,7 @@ from multiphi_exudyn.exudyn_plugin.convert.full_system import sphere_gap
 from multiphi_exudyn.exudyn_plugin.convert.items import has_limit_stops, is_sphere_contact
 from multiphi_exudyn.exudyn_plugin.convert.linearisation import Sphere
 from multiphi_exudyn.exudyn_plugin.convert.point_rows import coordinate_row, gap_row
-from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 
 __all__ = ["contact_distance", "contacts_of", "spheres_of"]
 

@@ -18,7 +18,7 @@ import exudyn as exu
 
 from multiphi_exudyn.exudyn_plugin.convert.items import has_friction
 from multiphi_exudyn.exudyn_plugin.convert.point_rows import coordinate_row
-from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.mechanics.elements.friction import Friction
 
 __all__ = ["frictions_of"]
 

@@ -17,8 +17,8 @@ import numpy as np
 
 from multiphi_exudyn.exudyn_plugin.convert.linearisation import Linearisation, MotionScales
 from multiphi_exudyn.exudyn_plugin.convert.range_check import TOLERANCE, RangeCheck
-from multiphi_exudyn.mechanics.element import Element
-from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.mechanics.elements.element import Element
+from multiphi_exudyn.mechanics.elements.friction import Friction
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["LinearLimits", "LinearRange"]

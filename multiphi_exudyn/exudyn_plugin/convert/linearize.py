@@ -23,9 +23,9 @@ from multiphi_exudyn.exudyn_plugin.convert.full_system import initial_is_current
 from multiphi_exudyn.exudyn_plugin.convert.linearized_structure import LinearizedStructure
 from multiphi_exudyn.exudyn_plugin.convert.point_rows import coordinate_row, default_points, requested_points
 from multiphi_exudyn.exudyn_plugin.convert.system_matrices import forces, projected_matrices
-from multiphi_exudyn.mechanics.arguments import Matrix
-from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
+from multiphi_exudyn.mechanics.structures.arguments import Matrix
+from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
 
 __all__ = ["check_system", "linear_structure_from"]
 

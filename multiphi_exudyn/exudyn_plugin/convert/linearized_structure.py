@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.dofs import Place
-from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.mechanics.structures.dofs import Place
+from multiphi_exudyn.mechanics.structures.structure import LinearStructure
 
 __all__ = ["LinearizedStructure"]
 

@@ -44,11 +44,11 @@ from multiphi_exudyn.exudyn_plugin.convert.system_matrices import linearised
 from multiphi_exudyn.exudyn_plugin.convert.timed_loads import TimedLoad, function_loads, timed_forces, timed_loads
 from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.mechanics.arguments import Matrix
-from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.static_loads import ConstantLoad
+from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
+from multiphi_exudyn.mechanics.elements.friction import Friction
+from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad
+from multiphi_exudyn.mechanics.structures.arguments import Matrix
+from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
 
 __all__ = ["reduce"]
 

@@ -14,7 +14,7 @@ from multiphi_exudyn.exudyn_plugin.convert.linear_range import LinearLimits, Lin
 from multiphi_exudyn.exudyn_plugin.convert.linearized_structure import LinearizedStructure
 from multiphi_exudyn.exudyn_plugin.convert.range_check import RangeCheck
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.mechanics.loads.loads import Load
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["Reduction"]

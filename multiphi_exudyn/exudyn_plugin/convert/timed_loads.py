@@ -17,7 +17,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.convert.geometric_stiffness import generalised_forces, static_solver
 from multiphi_exudyn.exudyn_plugin.convert.items import user_function, value_key
-from multiphi_exudyn.mechanics.loads import FunctionLoad
+from multiphi_exudyn.mechanics.loads.loads import FunctionLoad
 
 __all__ = ["TimedLoad", "function_loads", "timed_forces", "timed_loads"]
 

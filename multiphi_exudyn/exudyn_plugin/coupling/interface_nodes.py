@@ -23,8 +23,8 @@ import numpy as np
 from exudyn.itemInterface import NodeGenericODE2, NodePoint, NodePoint2D, NodeRigidBody2D, NodeRigidBodyRxyz
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.mechanics.arguments import real_array
-from multiphi_exudyn.mechanics.structure import At, LinearStructure
+from multiphi_exudyn.mechanics.structures.arguments import real_array
+from multiphi_exudyn.mechanics.structures.structure import At, LinearStructure
 
 __all__ = ["InterfaceNode", "InterfacePoint", "PositionInterface", "RigidInterface", "interface_nodes"]
 

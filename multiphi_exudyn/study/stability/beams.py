@@ -10,10 +10,10 @@ import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 
-from multiphi_exudyn.mechanics.beam import Beam, PointMass
-from multiphi_exudyn.mechanics.planar_beam import planar_beam
-from multiphi_exudyn.mechanics.section import Section
-from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.mechanics.beams.beam import Beam, PointMass
+from multiphi_exudyn.mechanics.beams.planar_beam import planar_beam
+from multiphi_exudyn.mechanics.beams.section import Section
+from multiphi_exudyn.mechanics.structures.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.structures import differs, pulled, rig_problem, stop
 from multiphi_exudyn.time.simulate import simulate

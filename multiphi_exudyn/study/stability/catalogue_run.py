@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.arguments import one_of
+from multiphi_exudyn.mechanics.structures.arguments import one_of
 from multiphi_exudyn.study.stability import beams, driven, friction, laws, starts, systems
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.exudyn_runs import (

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError
-from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.loads import FunctionLoad, HarmonicLoad, SampledLoad, SweepLoad
-from multiphi_exudyn.mechanics.structure import damping_matrix
+from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
+from multiphi_exudyn.mechanics.loads.loads import FunctionLoad, HarmonicLoad, SampledLoad, SweepLoad
+from multiphi_exudyn.mechanics.structures.structure import damping_matrix
 from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.stability.brute_force import highest_frequency
 from multiphi_exudyn.study.stability.case import STATIC_LOADS, Problem, Pull

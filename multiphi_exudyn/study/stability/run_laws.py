@@ -12,8 +12,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from multiphi_exudyn.events.transitions.state import Phase, total_loss
-from multiphi_exudyn.mechanics.element import Element
-from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.mechanics.elements.element import Element
+from multiphi_exudyn.mechanics.elements.friction import Friction
 from multiphi_exudyn.study.stability.run_signals import Signal
 from multiphi_exudyn.time.segments.segment import Segment
 from multiphi_exudyn.time.trajectory.ledger import Ledger

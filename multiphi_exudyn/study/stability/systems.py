@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.static_loads import ConstantLoad
-from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad
+from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.structures.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.starts import BILINEAR
 from multiphi_exudyn.study.stability.structures import differs, in_a_row, rig_problem, stop

@@ -19,9 +19,9 @@ from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.levels.mode_choice import is_count
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.compiling.compiled import available
-from multiphi_exudyn.mechanics.arguments import no_text, real_array
-from multiphi_exudyn.mechanics.loads import Load
-from multiphi_exudyn.mechanics.structure import At
+from multiphi_exudyn.mechanics.loads.loads import Load
+from multiphi_exudyn.mechanics.structures.arguments import no_text, real_array
+from multiphi_exudyn.mechanics.structures.structure import At
 from multiphi_exudyn.time.many.workers import StartVectors, Task
 from multiphi_exudyn.time.simulate import Run, checked_end, holding
 from multiphi_exudyn.time.warnings.base_warnings import row_warnings

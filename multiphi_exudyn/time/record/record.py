@@ -15,7 +15,7 @@ from multiphi_exudyn.events.packing.level_arrays import LevelArrays
 from multiphi_exudyn.events.transitions.exits import exits_of
 from multiphi_exudyn.events.transitions.state import Phase
 from multiphi_exudyn.mathematics.compiling.compiled import entry
-from multiphi_exudyn.mechanics.element import Element, ElementState
+from multiphi_exudyn.mechanics.elements.element import Element, ElementState
 from multiphi_exudyn.time.record.growing_array import GrowingArray
 from multiphi_exudyn.time.record.loop_copies import EMPTY, EVENTS, PARTS, copy_record
 from multiphi_exudyn.time.record.sampling import sample_rows, sample_sizes, sample_states

@@ -12,7 +12,7 @@ import numpy as np
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import Event, Loss
-from multiphi_exudyn.mechanics.element import event_kind
+from multiphi_exudyn.mechanics.elements.element import event_kind
 from multiphi_exudyn.time.record.record import Record
 from multiphi_exudyn.time.segments.segment import Segment, Segments
 

@@ -30,7 +30,7 @@ from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import CLEAR
-from multiphi_exudyn.mechanics.element import friction_spring
+from multiphi_exudyn.mechanics.elements.element import friction_spring
 from multiphi_exudyn.time.segments.segment import Segments
 
 __all__ = ["friction_warnings"]

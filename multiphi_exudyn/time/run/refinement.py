@@ -13,8 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from multiphi_exudyn.mechanics.loads import Load
-from multiphi_exudyn.mechanics.time_functions import Smooth, Sweep
+from multiphi_exudyn.mechanics.loads.loads import Load
+from multiphi_exudyn.mechanics.loads.time_functions import Smooth, Sweep
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["refined", "to_tolerance"]

@@ -17,8 +17,8 @@ import numpy as np
 from multiphi_exudyn.display import Shown
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.events.transitions.state import Event, total_impulse
-from multiphi_exudyn.mechanics.arguments import no_text
-from multiphi_exudyn.mechanics.structure import At
+from multiphi_exudyn.mechanics.structures.arguments import no_text
+from multiphi_exudyn.mechanics.structures.structure import At
 from multiphi_exudyn.time.segments.segment import Segment, Segments, as_segments
 from multiphi_exudyn.time.trajectory.history_figure import history_figure
 

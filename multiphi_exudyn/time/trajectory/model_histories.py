@@ -10,9 +10,9 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.structure import At
+from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
+from multiphi_exudyn.mechanics.elements.friction import Friction
+from multiphi_exudyn.mechanics.structures.structure import At
 from multiphi_exudyn.time.segments.level_rows import force_row, gap_row, patch_row, point_row, pressing_row
 from multiphi_exudyn.time.trajectory.histories import Histories
 from multiphi_exudyn.time.warnings.base_warnings import row_warnings

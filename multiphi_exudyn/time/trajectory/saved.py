@@ -34,7 +34,7 @@ from multiphi_exudyn.display import kinds
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.events.transitions.state import Event
 from multiphi_exudyn.files import write_whole
-from multiphi_exudyn.mechanics.structure import At
+from multiphi_exudyn.mechanics.structures.structure import At
 from multiphi_exudyn.time.segments.segment import Segment
 from multiphi_exudyn.time.trajectory.histories import Histories
 from multiphi_exudyn.time.trajectory.ledger import Ledger, Statistics

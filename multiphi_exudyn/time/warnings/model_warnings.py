@@ -11,8 +11,8 @@ from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.mode_choice import CONTACT_SHARE
 from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.mechanics.damping import ModalDamping
-from multiphi_exudyn.mechanics.modal_structure import ModalStructure
+from multiphi_exudyn.mechanics.structures.damping import ModalDamping
+from multiphi_exudyn.mechanics.structures.modal_structure import ModalStructure
 
 __all__ = ["REMEDY", "cluster_warnings", "damping_warnings", "missing_modes", "static_warnings"]
 

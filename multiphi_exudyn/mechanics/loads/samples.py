@@ -1,0 +1,121 @@
+"""Samples: a function of time by its values, with straight lines between them."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
+from multiphi_exudyn.mechanics.structures.arguments import is_real, real_array
+
+__all__ = ["Sampled"]
+
+COLLINEAR = 4 * np.finfo(float).eps  # of the largest sample: a sample this close to a line lies on it
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """Function of time in straight lines between samples; zero before the first and after the last.
+
+    Parameters
+    ----------
+    time : array (k,)
+        Ascending times [s], two or more.
+    values : array (k,)
+        Values, in m for a motion or N for a force.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For values that are not real numbers.
+    MultiPhiValueError
+        For fewer than two samples, unequal numbers of times and values, times that do not ascend, and values that are
+        not finite.
+
+    Examples
+    --------
+    >>> import multiphi_exudyn as mp
+    >>> pulse = mp.Sampled([0.0, 0.01, 0.02], [0.0, 50.0, 0.0])
+    >>> pulse.values.shape
+    (3,)
+    """
+
+    time: np.ndarray
+    values: np.ndarray
+
+    def __post_init__(self) -> None:
+        time, values = _samples("time", self.time), _samples("values", self.values)
+        if time.shape != values.shape or len(time) < 2:
+            raise MultiPhiValueError(
+                f"samples: got {len(time)} times and {len(values)} values, need two or more of each, as many of both"
+            )
+        if not np.all(np.diff(time) > 0):
+            worst = int(np.argmin(np.diff(time)))
+            raise MultiPhiValueError(
+                f"samples: got time {time[worst + 1]:g} s after {time[worst]:g} s, need ascending times"
+            )
+        object.__setattr__(self, "time", time)
+        object.__setattr__(self, "values", values)
+
+    @classmethod
+    def from_csv(cls, path: str | Path, column: int = 1) -> Sampled:
+        """Samples from a CSV file of two or more columns of numbers, time [s] first.
+
+        Lines that begin with # are skipped.
+
+        Parameters
+        ----------
+        path : str or path
+            Path of the file.
+        column : int, default 1
+            Column of the values, counted from 0.
+
+        Raises
+        ------
+        MultiPhiTypeError
+            For a column that is not a whole number.
+        MultiPhiValueError
+            For a file or a column that cannot be read.
+        """
+        if not is_real(column) or int(column) != column:
+            raise MultiPhiTypeError(f"samples: got column {column!r} of {path}, need a whole number >= 1")
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # of an empty file
+                table = np.loadtxt(path, delimiter=",", ndmin=2)
+            if not 1 <= column < table.shape[1]:
+                raise MultiPhiValueError(f"got column {column}, need 1 to {table.shape[1] - 1}")
+            return cls(table[:, 0], table[:, int(column)])
+        except (OSError, TypeError, ValueError) as error:
+            cause = " ".join(str(error).split())
+            raise MultiPhiValueError(f"samples: got {path}, need a CSV file of numbers: {cause}") from error
+
+    def history(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
+        """The function up to ``end`` [s]; samples on the line between their neighbours are left out."""
+        bends = _bends(self.time, self.values)
+        return PiecewiseExponential.sampled(self.time[bends], self.values[bends])
+
+
+def _bends(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Indices of the samples between which all others lie on straight lines, up to round-off of the largest value."""
+    widths, round_off = np.diff(time), COLLINEAR * float(np.max(np.abs(values)))
+    turns = np.abs(np.diff(np.diff(values) / widths)) > round_off * (1 / widths[1:] + 1 / widths[:-1])
+    bends = np.flatnonzero(np.concatenate([[True], turns, [True]]))
+    off = np.abs(np.interp(time, time[bends], values[bends]) - values) > round_off
+    return np.union1d(bends, np.flatnonzero(off))
+
+
+def _samples(name: str, given: Any) -> np.ndarray:
+    """A read-only copy (k,) of finite numbers."""
+    values = np.asarray(real_array(f"samples {name}", given, "(k,) real numbers"))
+    if values.ndim != 1:
+        raise MultiPhiValueError(f"samples {name}: got shape {values.shape}, need (k,)")
+    if not np.all(np.isfinite(values)):
+        raise MultiPhiValueError(f"samples {name}: got a value that is NaN or infinite, need finite numbers")
+    values.flags.writeable = False
+    return values
