@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from multiphi_exudyn.events.transitions.state import Phase, total_loss
+from multiphi_exudyn.mathematics.round_off import ZERO
 from multiphi_exudyn.mechanics.elements.element import Element
 from multiphi_exudyn.mechanics.elements.friction import Friction
 from multiphi_exudyn.study.stability.run_signals import Signal
@@ -29,7 +30,7 @@ LAW = 1e-8  # of the same: a complete basis' violation of the law of contact
 DIFFERENCE = 1e-2  # of a level's potential: energies are differences of it; of CLOSES it is round-off, of omega^2 too
 PASSED = 1e-5  # the same of what a start, an instant or a sum passes through: a few round-offs of its potential
 SMALLEST = 1e-6  # J, m: less is round-off in cases whose masses, stiffnesses and gaps are about 1
-ROUND_OFFS = 8  # of a sum's terms: a force that is none has so many at most
+ROUND_OFFS = 8  # of the time: an instant is known to so many
 INSTANT = 1e-12  # of the run: a shorter segment has no times of its own
 INSIDE = 5  # instants of a segment at which its reach is read
 
@@ -192,7 +193,7 @@ def missed(
 
     In a truncated basis this is checked for armed contacts and for closed rigid ones, which never pull. Round-off is
     that of the whole run: an impact that stops all motion leaves a state that is round-off of the one before, and a
-    reaction has that of its coordinates.
+    reaction is zero to the law where it is within ZERO of the terms that coordinates of the run make of it.
     """
     complete, reach = _complete(run), _reach(segments, SMALLEST * metre)
     largest: dict[tuple[int, str], float] = {}
@@ -206,7 +207,8 @@ def missed(
             continue
         size = largest[contact, signal.of]
         lowest, at = signal.lowest(segment.end - segment.start, samples)
-        unresolved = ROUND_OFFS * np.finfo(float).eps * (segment.end * signal.steepness(at) + signal.grain * reach)
+        unresolved = ROUND_OFFS * np.finfo(float).eps * segment.end * signal.steepness(at)
+        unresolved += ZERO * signal.grain * reach
         if lowest < -(MISSED if armed else LAW) * size - unresolved:
             name = run.model.contacts[contact].name
             return f"missed: {name} at {segment.start + at:.9g} s, {lowest / size:g} of its size"
