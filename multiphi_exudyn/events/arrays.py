@@ -173,7 +173,8 @@ FOLLOWS, FOLLOW_COUNT = 24, 25  # rows (s, n + 1) of stretches proportional to t
 DISSIPATED = 26  # form in (eta, eta') of the work of damping in the free response, -1 without
 SWINGS = 27  # in the waves, of the free response: velocities, and the factors of w, w' in the power of varying loads
 FREE_SIZES = 8  # |A|, |B|, |P| (3, p, r) of its response, if channels are functions of time
-STRUCK_DEFECTS = 9  # (c,) of rigid contacts that are struck in it and open again, per squared impulse; -1 without
+STRUCK_DEFECTS = 9  # (c,) of rigid contacts that are struck in it and open again, per squared impulse; zero until they
+#             are needed, -1 where levels are not judged
 SIZES = 28  # triangular factor (n + 1, n + 1) of (Psi, R, y_inf), |y| = |factor (xi, 1)|, then the row (n + 1,) with
 #             which static loads work on y; zero until it is needed
 DISSIPATED_MODES = 30  # (r, 2) of each mode in that form: the first mode coupled with it, and one past the last
@@ -208,7 +209,7 @@ EVENT_WIDTH, EVENT_WIDTH_NUMBERS, IMPACT_WIDTH = 3, 3, 5
 # ---------------------------------------------------------------------- return values
 
 OK, NEED, FAILED, FULL, END_REACHED, EVENT = 0, -11, -12, -13, 1, 2  # the negative ones below any sign
-NEED_LEVEL, NEED_MAP, NEED_ENTERED, NEED_PIECES, NEED_ROOM, NEED_POWERS, NEED_SIZES = 1, 2, 3, 4, 5, 6, 7
+NEED_LEVEL, NEED_MAP, NEED_ENTERED, NEED_PIECES, NEED_ROOM, NEED_POWERS, NEED_SIZES, NEED_STRUCK = range(1, 9)
 NOT_FINITE, TOO_LONG, CHATTER, NOT_ADMISSIBLE, SQUEEZED, UNSETTLED, UNAVAILABLE, MIXED, GAINING = range(1, 10)
 
 

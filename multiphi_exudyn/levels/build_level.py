@@ -108,7 +108,8 @@ def _force_rows(
     if any(rigid):
         directions = base.directions[:, closed]
         pinned = directions[:, rigid]
-        forces[rigid] = _reaction_rows(base, pinned, squares, vectors, directions @ forces)
+        spring_forces = None if all(rigid) else directions @ forces
+        forces[rigid] = _reaction_rows(base, pinned, squares, vectors, spring_forces)
         rates[rigid] = least_squares(pinned, damped)
     return forces, rates
 
@@ -135,24 +136,24 @@ def independent(base: ModalBase, rigid: Sequence[int]) -> bool:
 
 def _has_full_rank(base: ModalBase, triangle: np.ndarray) -> bool:
     """Return whether unit directions are linearly independent; triangle: R (k, k) of their QR decomposition."""
-    remainders = np.abs(np.diagonal(triangle))
-    return triangle.shape[1] <= base.modes.count and bool(np.min(remainders) > INDEPENDENT)
+    remainders = triangle.diagonal().tolist()
+    return triangle.shape[1] <= base.modes.count and all(abs(remainder) > INDEPENDENT for remainder in remainders)
 
 
-def _following(base: ModalBase, rigid: Sequence[int]) -> np.ndarray:
+def _following(base: ModalBase, rigid: list[int]) -> np.ndarray:
     """Return for every contact (c,) whether these independent rigid contacts keep its gap constant."""
+    following = base.lengths == 0
+    if not rigid:
+        return following
     units = base.units
-    if not len(rigid):
-        return base.lengths == 0
-    q, triangle = orthonormal(units[:, list(rigid)])
+    q, triangle = orthonormal(units[:, rigid])
     if not _has_full_rank(base, triangle):
         names = ", ".join(base.links[i].name for i in rigid)
         raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
     components = q.T @ units
-    almost = (components * components).sum(axis=0) > ALMOST
-    almost[list(rigid)] = False  # no remainder beside themselves
-    following = base.lengths == 0
-    following[list(rigid)] = True
+    almost = np.einsum("ij,ij->j", components, components) > ALMOST
+    almost[rigid] = False  # no remainder beside themselves
+    following[rigid] = True
     if almost.any():
         remainders = units[:, almost] - q @ components[:, almost]
         following[almost] |= np.linalg.norm(remainders, axis=0) <= INDEPENDENT
@@ -171,20 +172,24 @@ def _rigid_body_modes(base: ModalBase, closed_directions: ClosedDirections) -> i
 
 
 def _reaction_rows(
-    base: ModalBase, pinned: np.ndarray, squares: np.ndarray, vectors: np.ndarray, spring_forces: np.ndarray
+    base: ModalBase, pinned: np.ndarray, squares: np.ndarray, vectors: np.ndarray, spring_forces: np.ndarray | None
 ) -> np.ndarray:
     """Return the reactions (c, r) of every mode: (Omega^2 - omega^2) psi - (force of the springs) = H_r rho.
 
-    Weighted by 1 / (Omega^2 + |omega^2|), in which no mode of the base outweighs the others.
+    Weighted by 1 / (Omega^2 + |omega^2|), in which no mode of the base outweighs the others. spring_forces: (m, r), or
+    None.
     """
     total = base.squares + np.abs(squares)[:, None]  # a row for every mode, as vectors stand in memory
     if not total[:, 0].all():
         smallest = np.min(np.where(total > 0, total, np.inf), axis=1, initial=np.inf, keepdims=True)
         total = np.where(total > 0, total, np.where(np.isinf(smallest), 1.0, smallest))
-    residuals = (base.squares - squares[:, None]) * vectors.T - spring_forces.T
+    residuals = (base.squares - squares[:, None]) * vectors.T
+    if spring_forces is not None:
+        residuals -= spring_forces.T
     if pinned.shape[1] == 1:
         along = pinned[:, 0]
-        return np.asarray((residuals / total @ along) / (along * along / total).sum(axis=1))[None, :]
+        weighted = along / total
+        return np.asarray(np.einsum("ij,ij->i", weighted, residuals) / (weighted @ along))[None, :]
     roots = 1 / np.sqrt(total)
     q, r = np.linalg.qr(roots[:, :, None] * pinned)
     projected = np.einsum("ijk,ij->ik", q, roots * residuals)

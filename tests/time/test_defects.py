@@ -146,3 +146,20 @@ def test_a_start_that_sticks_is_left_to_those_who_look_at_all_modes(seed):
     assert (run.events[0].kind, run.events[0].time) == ("stick", 0.0)
     exact = sum(defect.size**2 for defect in defects(run))
     assert_allclose(total_defect(run), exact, rtol=1e-12)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_what_a_struck_contact_removes_is_packed_where_one_opens_again(restitution):
+    """At its first bounce, and then the sum is that of a run whose levels had it before."""
+    stop = mp.UnilateralContact("stop", "m5", 0.05, restitution=restitution)
+    model, start = mp.MultiPhiModel(chain(7), [stop], modes=3), {"velocity": -np.linspace(0.1, 0.4, 7)}
+    sums = []
+    for _ in range(2):
+        run = Run(model, END, **start).begun()
+        packed = [int(run.arrays.ints[record + a.STRUCK_DEFECTS]) for record in run.arrays._tables.levels]
+        assert any(packed) == bool(sums)
+        run.advance(END)
+        sums.append(float(run.arrays.numbers[a.DEFECTS]))
+    exact = sum(defect.size**2 for defect in defects(simulated(model, END, **start)))
+    assert sums[0] == sums[1]
+    assert_allclose(sums[0], exact, rtol=1e-9)

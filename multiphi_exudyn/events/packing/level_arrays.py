@@ -20,6 +20,7 @@ from multiphi_exudyn.events.packing.level_records import (
     put_signal,
     put_sizes,
     put_strain,
+    put_struck,
 )
 from multiphi_exudyn.events.packing.level_tables import LevelTables
 from multiphi_exudyn.events.packing.scratch_arrays import ScratchArrays
@@ -224,7 +225,9 @@ class LevelArrays:
         elif self.ints[a.NEEDED] == a.NEED_POWERS:
             self.add_powers(source)
         elif self.ints[a.NEEDED] == a.NEED_SIZES:
-            self._add_sizes(source)
+            put_sizes(self.buffers, source, self.loaded[int(self.ints[source + a.NUMBER])])
+        elif self.ints[a.NEEDED] == a.NEED_STRUCK:
+            put_struck(self.buffers, source, self.loaded[int(self.ints[source + a.NUMBER])])
         else:
             self._supply_room()
 
@@ -269,10 +272,6 @@ class LevelArrays:
         record = self._offsets[self._levels[states]] if states in self._levels else 0
         if record and not self.ints[record + a.STRAIN_FORM]:
             put_strain(self.buffers, record, self.loaded[self._levels[states]])
-
-    def _add_sizes(self, level: int) -> None:
-        """Pack the factors of |y| and of the work of static loads in a level that is packed."""
-        put_sizes(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])])
 
     def _add_entered(self, source: int, exit_number: int) -> None:
         """Pack the signal that an exit's element would have in the level entered alone."""

@@ -24,7 +24,7 @@ from multiphi_exudyn.mathematics.response.basis_arrays import describe_basis
 from multiphi_exudyn.mathematics.response.exponentials import Exponentials
 from multiphi_exudyn.mechanics.elements.element import Exit, Share
 
-__all__ = ["put_base", "put_level", "put_powers", "put_signal", "put_sizes", "put_strain"]
+__all__ = ["put_base", "put_level", "put_powers", "put_signal", "put_sizes", "put_strain", "put_struck"]
 
 Put: TypeAlias = Callable[[str, object], int]  # Buffers.put, or Batch.put
 
@@ -58,7 +58,7 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
         a.STATES: put("ints", level.states),
         a.RESPONSE: _put_response(batch, level, basis),
         a.FREE_SIZES: put("numbers", _free_sizes(level)) if buffers.ints[a.PRESCRIBED] else -1,
-        a.STRUCK_DEFECTS: put("numbers", struck_defects(level)) if buffers.ints[a.JUDGED] else -1,
+        a.STRUCK_DEFECTS: 0 if buffers.ints[a.JUDGED] else -1,
         a.FORCE: put("numbers", level.asymptotic.drive) if level.driven else -1,
         a.EXITS: _put_exits(batch, level, exits, kept),
         a.EXIT_COUNT: int(firsts[-1]),
@@ -121,6 +121,11 @@ def put_sizes(buffers: Buffers, record: int, level: LoadedLevel) -> None:
     factors[-1] = level.excitation.static @ motion
     factors[:-1] = factor(motion)
     buffers.ints[record + a.SIZES] = buffers.put("numbers", factors)
+
+
+def put_struck(buffers: Buffers, record: int, level: LoadedLevel) -> None:
+    """Add the defects of contacts that are struck and open again to the record of a level."""
+    buffers.ints[record + a.STRUCK_DEFECTS] = buffers.put("numbers", struck_defects(level))
 
 
 def put_strain(buffers: Buffers, record: int, level: LoadedLevel) -> None:

@@ -29,6 +29,9 @@ from multiphi_exudyn.events.arrays import (
     MAP_DEFECT,
     MAPPED_AGAIN,
     MODES,
+    NEED_STRUCK,
+    NEEDED,
+    NEEDED_FROM,
     OPEN,
     PERIODS,
     PLACE,
@@ -42,7 +45,7 @@ from multiphi_exudyn.events.arrays import (
 from multiphi_exudyn.events.states.maps import find_map, map_state
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
 
-__all__ = ["add_defect", "add_start_defect"]
+__all__ = ["add_defect", "add_start_defect", "lacks_struck_defects"]
 
 NO_IMPACT, STAYS_CLOSED, REOPENS = 0, 1, 2
 
@@ -67,6 +70,20 @@ def add_defect(ints: Ints, numbers: Numbers, before: int, after: int) -> None:
         list_differences(ints, numbers, map_record, before, after)
         x, v, count = ints[WORK_NUMBERS], ints[WORK_NUMBERS] + n + further, n + further
     numbers[DEFECTS] += squares(numbers, ints[map_record + MAP_DEFECT], width, x, v, count)
+
+
+@compiled
+def lacks_struck_defects(ints: Ints, numbers: Numbers, before: int, after: int) -> int:
+    """Return 1 with a request where ``add_defect`` needs what a struck contact that opens again removes, else 0."""
+    level = ints[after + LEVEL]
+    if (
+        ints[level + STRUCK_DEFECTS] != 0
+        or ints[before + LEVEL] != level
+        or impact_kind(ints, numbers, after) != REOPENS
+    ):
+        return 0
+    ints[NEEDED], ints[NEEDED_FROM] = NEED_STRUCK, level
+    return 1
 
 
 @compiled

@@ -24,7 +24,7 @@ from scipy.linalg.lapack import dgeqrf
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.transition import Transition
 from multiphi_exudyn.levels.modal_base import ModalBase
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import least_squares
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import without
 
 __all__ = ["DefectForm", "allowed", "defect_form", "factor", "held_rigidly", "over_omega"]
 __all__ += ["start_form", "struck_defects"]
@@ -93,7 +93,8 @@ def _motion(transition: Transition, matrix: np.ndarray) -> np.ndarray:
     n = source.shape[1]
     columns = np.empty((1 + n + target.shape[1], len(source)))  # one after the other, as a factor is formed of them
     columns[0] = before.asymptotic.configuration - after.asymptotic.configuration - target @ transition.offset
-    np.subtract(source.T, matrix.T @ target.T, out=columns[1 : n + 1])
+    rest = np.dot(matrix.T, target.T, out=columns[1 : n + 1])
+    np.subtract(source.T, rest, out=rest)
     columns[n + 1 :] = target.T
     return columns.T
 
@@ -147,8 +148,7 @@ def allowed(base: ModalBase, held: set[int], motion: np.ndarray) -> np.ndarray:
     """Return the part of motions (m, ...) that rigid contacts allow."""
     if not held:
         return motion
-    directions = base.directions[:, sorted(held)]
-    return motion - directions @ least_squares(directions, motion)
+    return without(base.directions[:, sorted(held)], motion)
 
 
 def over_omega(base: ModalBase, motion: np.ndarray) -> np.ndarray:

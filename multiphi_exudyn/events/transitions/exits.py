@@ -151,14 +151,13 @@ def _link_parts(level: LoadedLevel, links: np.ndarray, shares: np.ndarray) -> tu
     np.multiply(level.gap_constants[links], shares[:, 0], out=table[:, -1])
     sizes, pressing = np.abs(table[:, -1]), shares[:, 2].nonzero()[0]
     if len(pressing):
-        position = np.zeros(len(level.gap_constants), int)
-        position[list(own.indices)] = range(len(own.indices))
-        active, share = position[links[pressing]], shares[pressing, 2]
-        table[pressing, :n] += share[:, None] * own.force_rows[active]
-        table[pressing, n:-1] += share[:, None] * own.force_rate_rows[active]
-        forces = share * level.asymptotic.forces[active]
-        table[pressing, -1] += forces
-        sizes[pressing] += np.abs(forces)
+        active = [own.indices.index(link) for link in links[pressing].tolist()]
+        pressed = np.concatenate(
+            [own.force_rows[active], own.force_rate_rows[active], level.asymptotic.forces[active, None]], axis=1
+        )
+        pressed *= shares[pressing, 2:]
+        table[pressing] += pressed
+        sizes[pressing] += np.abs(pressed[:, -1])
     return table, sizes
 
 

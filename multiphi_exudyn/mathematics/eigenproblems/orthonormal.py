@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["least_squares", "orthonormal"]
+__all__ = ["least_squares", "orthonormal", "without"]
 
 
 def orthonormal(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -22,3 +22,10 @@ def least_squares(directions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
         return np.asarray(np.linalg.lstsq(directions, vectors, rcond=None)[0])
     square = float(directions[:, 0] @ directions[:, 0])
     return np.asarray(directions.T @ vectors / (square or np.inf))
+
+
+def without(directions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Return the part of vectors (m, ...) that is orthogonal to directions (m, k), column by column in memory."""
+    shares = least_squares(directions, vectors)
+    removed = np.multiply.outer(shares[0], directions[:, 0]) if len(shares) == 1 else shares.T @ directions.T
+    return np.subtract(vectors.T, removed, out=removed).T

@@ -52,9 +52,11 @@ def _uncoupled(damping: np.ndarray) -> bool:
     """Return whether the off-diagonal elements of damping (r, r) are round-off."""
     diagonal, others = np.abs(damping.diagonal()), np.abs(damping)
     others.flat[:: len(others) + 1] = 0.0
-    largest = diagonal.max(initial=0.0)
-    if others.max(initial=0.0) > DIAGONAL * largest:
+    largest, coupling = diagonal.max(initial=0.0), others.max(initial=0.0)
+    if coupling > DIAGONAL * largest:
         return False
+    if coupling <= DIAGONAL * diagonal.min(initial=math.inf):
+        return True
     scale = np.sqrt(np.outer(diagonal, diagonal))
     return bool((others <= DIAGONAL * np.maximum(scale, largest * DIAGONAL)).all())
 

@@ -112,13 +112,14 @@ def uncoupled(squares: np.ndarray, damping: np.ndarray, duration: float = math.i
 
     duration: of the longest motion [s].
     """
-    terms = [term for k in range(len(squares)) for term in _mode_terms(k, squares[k], damping[k] / 2, duration)]
+    given = enumerate(zip(squares.tolist(), damping.tolist(), strict=True))
+    terms = [term for k, (square, rate) in given for term in _mode_terms(k, square, rate / 2, duration)]
     p, r = len(terms), len(squares)
-    shapes, maps = np.zeros((r, p), complex), np.zeros((3, p, r), complex)
-    for j, (k, _, _, weights) in enumerate(terms):
-        shapes[k, j] = 1.0
-        maps[:, j, k] = weights
-    basis = Exponentials(np.array([t[1] for t in terms], complex), np.array([t[2] for t in terms], int))
+    modes, rates, powers, weights = zip(*terms, strict=True) if terms else ((), (), (), ())
+    shapes, maps, own = np.zeros((r, p), complex), np.zeros((3, p, r), complex), np.arange(p)
+    shapes[modes, own] = 1.0
+    maps[:, own, modes] = np.array(weights, complex).reshape(p, 3).T
+    basis = Exponentials(np.array(rates, complex), np.array(powers, int))
     alone, poles = np.ones(r, bool), np.zeros(p, bool)
     return ModalResponse(basis, shapes, maps[0], maps[1], maps[2], diagonal=True, alone=alone, poles=poles)
 
@@ -132,17 +133,17 @@ def _mode_terms(k: int, square: float, delta: float, duration: float) -> list[Te
         return _free_terms(k, delta, duration)
     if square < 0:
         return _growing_terms(k, square, delta)
-    omega = np.sqrt(square)
+    omega = math.sqrt(square)
     difference = (delta - omega) * (delta + omega)
-    root = np.sqrt(abs(difference))
+    root = math.sqrt(abs(difference))
     if root <= NEARLY_CRITICAL * omega:
         s = difference  # cosh, sinh(s t)/s of small s t, to t^5
-        even, odd = (1.0, 0.0, s / 2, 0.0, s**2 / 24, 0.0), (0.0, 1.0, 0.0, s / 6, 0.0, s**2 / 120)
+        even, odd = (1.0, 0.0, s / 2, 0.0, s * s / 24, 0.0), (0.0, 1.0, 0.0, s / 6, 0.0, s * s / 120)
         return [(k, -delta, d, (e + delta * o, o, 0.0)) for d, (e, o) in enumerate(zip(even, odd, strict=True))]
     if difference < 0:
         return [(k, complex(-delta, root), 0, (1 - 1j * delta / root, -1j / root, 0.0))]
     fast = -(delta + root)
-    slow = omega**2 / fast
+    slow = square / fast
     return [
         (k, slow, 0, (-fast / (slow - fast), 1 / (slow - fast), 0.0)),
         (k, fast, 0, (slow / (slow - fast), -1 / (slow - fast), 0.0)),
@@ -151,7 +152,7 @@ def _mode_terms(k: int, square: float, delta: float, duration: float) -> list[Te
 
 def _growing_terms(k: int, square: float, delta: float) -> list[Term]:
     """Return the terms of omega^2 < 0, delta >= 0: a growing and a decaying rate, the smaller from their product."""
-    decaying = -(delta + np.sqrt(delta**2 - square))
+    decaying = -(delta + math.sqrt(delta * delta - square))
     growing = square / decaying
     difference = growing - decaying
     return [
@@ -169,7 +170,7 @@ def _free_terms(k: int, delta: float, duration: float) -> list[Term]:
         further = enumerate(slow_powers(-rate, duration), start=2)
         return [*first, *((k, 0.0, n, (0.0, -rate * weight, weight)) for n, weight in further)]
     return [
-        (k, 0.0, 0, (1.0, 1 / rate, -1 / rate**2)),
+        (k, 0.0, 0, (1.0, 1 / rate, -1 / (rate * rate))),
         (k, 0.0, 1, (0.0, 0.0, 1 / rate)),
-        (k, -rate, 0, (0.0, -1 / rate, 1 / rate**2)),
+        (k, -rate, 0, (0.0, -1 / rate, 1 / (rate * rate))),
     ]

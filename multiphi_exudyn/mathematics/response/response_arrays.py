@@ -34,7 +34,6 @@ used nearer to the poles, as long as they are not much larger: their cancellatio
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 
@@ -79,10 +78,10 @@ def reached_modes(maps: Sequence[np.ndarray]) -> np.ndarray:
     if any(part.all() for part in maps):
         reached[:, 1] = r
     elif r:
-        part = functools.reduce(np.logical_or, maps)
-        some = part.any(axis=1)
-        reached[:, 0] = np.where(some, part.argmax(axis=1), r)
-        reached[:, 1] = np.where(some, r - part[:, ::-1].argmax(axis=1), 0)
+        part = np.any(maps, axis=0)
+        np.argmax(part, axis=1, out=reached[:, 0])
+        np.subtract(r, np.argmax(part[:, ::-1], axis=1), out=reached[:, 1])
+        reached[~part.any(axis=1)] = r, 0
     return reached
 
 

@@ -95,7 +95,7 @@ from multiphi_exudyn.events.law.decision import decide, decide_jump
 from multiphi_exudyn.events.law.first_state import begin
 from multiphi_exudyn.events.law.monitoring import arm, collect_requests, flag_repeated_requests, watch
 from multiphi_exudyn.events.states.channel_values import keep_drive, load_piece, piece_end, set_drive
-from multiphi_exudyn.events.states.defect_sums import add_defect, add_start_defect
+from multiphi_exudyn.events.states.defect_sums import add_defect, add_start_defect, lacks_struck_defects
 from multiphi_exudyn.events.states.energies import energy, kinetic, pattern_work, potential, strain
 from multiphi_exudyn.events.states.flow import expand, state_at
 from multiphi_exudyn.events.states.maps import find_map
@@ -245,6 +245,8 @@ def begin_next_piece(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> 
             numbers[v + i] += numbers[row + k * (r + q) + i] * jump
     measure(ints, numbers, REACHED)
     status = fail_if_unavailable(ints, decide_jump(ints, numbers, waves))
+    if status == EVENT and lacks_struck_defects(ints, numbers, REACHED, WORKED) == 1:
+        status = NEED
     if status == NEED or ints[EVENT_COUNT] + ints[CHANGE_COUNT] > ints[EVENT_ROOM]:
         ints[PIECE] -= 1
         return NEED if status == NEED else FULL
@@ -310,6 +312,8 @@ def advance_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> i
     if decision_due > 0:
         flag_repeated_requests(ints, 1 if at_once and ints[WHOLE] == 0 else 0)
         status = decide(ints, numbers, waves)
+        if status >= 0 and lacks_struck_defects(ints, numbers, REACHED, WORKED) == 1:
+            status = NEED
     else:
         ints[CHANGE_COUNT] = 0
     status = fail_if_unavailable(ints, status)
