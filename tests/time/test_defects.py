@@ -10,6 +10,7 @@ from small_structures import chain
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.events import arrays as a
+from multiphi_exudyn.events.transitions.defect_forms import struck_defects
 from multiphi_exudyn.time.reliability.defects import defects, total_defect
 from multiphi_exudyn.time.segments.segment import as_segments
 from multiphi_exudyn.time.simulate import Run
@@ -163,3 +164,15 @@ def test_what_a_struck_contact_removes_is_packed_where_one_opens_again(restituti
     exact = sum(defect.size**2 for defect in defects(simulated(model, END, **start)))
     assert sums[0] == sums[1]
     assert_allclose(sums[0], exact, rtol=1e-9)
+
+
+def test_what_an_impulse_leaves_out_is_the_same_under_a_load_that_varies():
+    """The velocities that an impulse makes are those of modes alone, not of shapes that follow a load."""
+    stops = [mp.UnilateralContact(f"stop{k}", f"m{k}", 0.02) for k in (2, 4)]
+    model = mp.MultiPhiModel(chain(7), stops, modes=3)
+    load = mp.SampledLoad("m1", [0.0, 0.5, 1.0], [0.0, 1.0, -1.0])
+    run = simulated(model, 1.0, displacement=np.full(7, -0.01), loads=[load])
+    level = run.segments[0].level
+    assert level.level.modes > level.modal.modes == 3
+    assert_allclose(struck_defects(level), struck_defects(level.alone), rtol=1e-12)
+    assert np.all(struck_defects(level) > 0)

@@ -110,13 +110,13 @@ def struck_defects(level: LoadedLevel) -> np.ndarray:
     The level's modes map the impulse to V V^T h, of which Q keeps the part orthogonal to h and to the closed rigid
     contacts. It is unknown for contacts with friction, whose impulse has another direction.
     """
-    own, base = level.level, level.level.base
+    modes, base = level.modal.vectors, level.level.base
     result, rigid = np.full(len(base.contacts), np.nan), base.frictionless_rigid_contacts
     if not len(rigid):
         return result
     held, given = held_rigidly(level), base.directions[:, rigid]
-    across, motions = allowed(base, held, given), allowed(base, held, own.vectors)
-    moved, lengths = motions @ (own.vectors.T @ given), np.einsum("ij,ij->j", across, across)
+    across, motions = allowed(base, held, given), allowed(base, held, modes)
+    moved, lengths = motions @ (modes.T @ given), np.einsum("ij,ij->j", across, across)
     along = np.divide(np.einsum("ij,ij->j", across, moved), lengths, out=np.zeros(len(rigid)), where=lengths > 0)
     left = over_omega(base, moved - across * along)
     result[rigid] = np.einsum("ij,ij->j", left, left)
