@@ -26,7 +26,8 @@ signal    ints[signal ...]        s = row . (xi, xi', 1): offsets of its row (2n
 map       ints[map ...]           xi_m = T xi_l + c, xi'_m = T' xi'_l + c' (eq. 38.6), channels included; if it sets
                                   held displacements, the sizes of the terms of T and c, (n_m, n_l + 1), else -1; if
                                   levels leave modes out, the form of its defect (defect_sums.py), else -1
-state     ints[state ...]         level, offsets of xi, xi' and their scales, the phase of every exit
+state     ints[state ...]         level, offsets of xi, xi', their scales, and the sizes of their terms in the map that
+                                  has made them; the phase of every exit
 piece     ints[piece ...]         of the channels: Re sum_j exp(mu_j s) sum_d a_jd s^d, s = t - t_i: times, its terms
 segment   SEGMENT_INTS            number of the level, piece, offsets of coordinates and phases of its start
           INSTANTS                start, before the end of the last one
@@ -117,19 +118,20 @@ JUDGED = 211  # whether levels leave modes out, so that defects are summed
 # states, as records in the run record: CURRENT at the start of the present segment, REACHED at its end, before the
 # decision, WORKED in a decision, ENTERED_STATE in a level under trial; in an impact RELEASED before it, all touching
 # contacts open, STRUCK after it, STILL without negligible speeds, AFTER in the level of the contacts that stay closed
-CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(120, 184, 8)
-GIVEN, SLOWED = range(184, 200, 8)  # at the start, in all modes: before and after its impact
+CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(120, 192, 9)
+# in all modes: GIVEN and SLOWED before and after the impact at the start; COMPRESSED, in levels too, after the
+# compression of an impact with friction and restitution
+GIVEN, SLOWED, COMPRESSED = range(234, 261, 9)
 LIMITS, STATIC_LIMITS = 200, 201  # of rigid friction; mu at compliant contacts without tangential spring; else zero
 TOGETHER = 202  # whether friction at rest has been decided together at this instant
 FRICTIONS, STATIC_FRICTIONS = 212, 213  # mu of rigid contacts, else zero
 PUSHING, ENTERS = 214, 215  # rows of the impulses of a small problem; the state that a closing contact enters
-COMPRESSED = 216  # a state, in all modes too: after the compression of an impact with friction and restitution
 UNMOVED = 224  # flags of elements that cannot move: their exits are not monitored
 WORKING, SUMMED = 225, 226  # whether works are summed as segments end; whether those of the present segment are
 STARTS, START_STATES, START = 228, 229, 230  # offsets of starts and of their states; the number of the run's start
 MAPPED_AGAIN, SPEEDS_CHANGED = 231, 232  # whether the present decision used several maps, and impacts
 ISOLATED = 233  # whether no load acts on the structure
-RUN_INTS = 234
+RUN_INTS = 261
 
 # ---------------------------------------------------------------------- run record, numbers
 
@@ -193,8 +195,8 @@ MAP_SIZES = 4  # of a map from the base: of the terms due to channels, w = 1, an
 MAP_ENTRY = 3  # ints of an entry of the table: from, to, map
 LOOK_WIDTH = 3  # numbers of LOOKED, and of SEEN
 
-LEVEL, PLACE, SPEED, REACH, MAPPED, SWING, PHASES, SETTLED = range(8)
-STATE_INTS = 8
+LEVEL, PLACE, SPEED, REACH, MAPPED, MAPPED_SPEED, SWING, PHASES, SETTLED = range(9)
+STATE_INTS = 9
 
 DRIVEN_COUNT, NODE_COUNT, CARRIER_COUNT = 0, 1, 2  # coefficients, nodes of a quadrature, carriers
 DRIVEN_RESPONSE, CHANGING_DAMPING, CHANGING_VARYING, LASTING_DAMPING, LASTING_VARYING, NODES, WEIGHTS = range(3, 10)

@@ -23,7 +23,7 @@ from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.levels.sliding import SlidingLevel
 from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING
-from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
+from multiphi_exudyn.mathematics.round_off import PRODUCT, ZERO, drop_round_off
 
 __all__ = ["Channels"]
 
@@ -164,10 +164,12 @@ def _quasi_static_parts(level: Level, patterns: np.ndarray) -> tuple[np.ndarray,
     """Return static responses (m, q) and contact forces (k, q) to loads, without the part in the level's modes.
 
     (K_l^-1 - Psi omega^-2 Psi^T) b is computed as K_l^-1 (1 - Psi Psi^T) b: if a kept mode is soft, both terms of the
-    former are large. The remaining part in the modes is round-off, and is removed.
+    former are large. The remaining part in the modes is round-off, and is removed. A remainder that is round-off of the
+    products of a load with modes is zero: of weight on all modes of a free structure nothing remains.
     """
     psi = level.vectors
-    remainder = patterns - psi @ (psi.T @ patterns)
+    lengths = np.linalg.norm(patterns, axis=0)
+    remainder = drop_round_off(patterns - psi @ (psi.T @ patterns), PRODUCT / ZERO * lengths)
     y, forces = _static_responses(level, remainder, np.zeros((len(level.indices), remainder.shape[1])))
     part = psi.T @ y
     return y - psi @ part, forces - level.force_rows @ part

@@ -46,7 +46,8 @@ the functions that implement it:
    its displacement further, it requests the segment in which its displacement lies. It goes on at the same instant
    until its segment contains its displacement, but does not return to the segment that it has just left.
    -> changes.segment_at, changes.set_requested_states, switching.is_unconditional, decision.is_return
-9. The sign of a signal is that of its first derivative, of order zero or higher, that is not round-off.
+9. The sign of a signal is that of its first derivative, of order zero or higher, that is not round-off: of its terms,
+   of the earlier motion, or of the map that has made the state.
    -> signals.row_sign, signals.rate_sign, phases.becomes
 10. A contact with friction and a tangential spring sticks when it closes. Without a spring it slides in the direction
    of its slip velocity, or sticks if that is zero. A stick or slip that cannot last does not prevent closing: exits

@@ -47,10 +47,10 @@ from multiphi_exudyn.events.arrays import (
 from multiphi_exudyn.events.law.changes import NO_REQUEST
 from multiphi_exudyn.events.law.phases import entered_signal
 from multiphi_exudyn.events.states.flow import signal_waves
-from multiphi_exudyn.events.states.signals import held_part, mapped_terms
+from multiphi_exudyn.events.states.signals import held_part, mapped_size
 from multiphi_exudyn.events.states.state_arrays import accelerate
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.response.basis_arrays import differentiate
+from multiphi_exudyn.mathematics.response.basis_arrays import POWERS, differentiate
 from multiphi_exudyn.mathematics.round_off import CLEAR, ZERO
 from multiphi_exudyn.mathematics.search.zero_crossing import simultaneous
 
@@ -97,40 +97,50 @@ def wait_for(
 ) -> int:
     """List the signal of an exit, or the one ``entered``, times ``sign``, or its rate; count + 1.
 
-    What begins below zero by round-off, a reaction by that of the transition before, begins at zero: so it was judged.
+    A value below zero that is round-off, of its own terms or of the map that has made CURRENT, was judged zero. The
+    signal then starts at zero: the exponentials, which sum up to it, have a round-off of their own.
     """
     level = ints[CURRENT + LEVEL]
     signal = entered if entered > 0 else ints[level + EXITS] + exit_number * EXIT_INTS + SIGNAL
     n, p, row = ints[level + MODES] + ints[CHANNELS], ints[FLOW_COUNT], ints[signal + ROW]
     x, v, scale, first = ints[CURRENT + PLACE], ints[CURRENT + SPEED], ints[CURRENT + REACH], ints[SIGNALS] + count * p
     signal_waves(ints, numbers, waves, CURRENT, signal, first)
-    constant, size = numbers[row + 2 * n], abs(numbers[row + 2 * n])
-    constant = sign * (constant + held_part(ints, numbers, CURRENT, signal))
+    begins, size = numbers[row + 2 * n], abs(numbers[row + 2 * n])
+    constant = begins + held_part(ints, numbers, CURRENT, signal)
     if rate == 1:
         differentiate(ints, numbers, waves, ints[FLOW_BASIS], first, first)
-        x, v, scale, constant, size = v, ints[ACCELERATION], ints[CURRENT + SWING], 0.0, 0.0
-    begins = sign * numbers[row + 2 * n]
+        x, v, scale = v, ints[ACCELERATION], ints[CURRENT + SWING]
+        constant, begins, size = 0.0, 0.0, 0.0
     for i in range(n):
         size += abs(numbers[row + i]) * (abs(numbers[x + i]) + numbers[scale + i])
-        begins += sign * (numbers[row + i] * numbers[x + i])
+        begins += numbers[row + i] * numbers[x + i]
     if ints[signal + RATED] == 1:
         swing = ints[CURRENT + SWING]
         if rate == 1:
             accelerate(ints, numbers, CURRENT, v)
         for i in range(n):
             size += abs(numbers[row + n + i]) * (abs(numbers[v + i]) + (numbers[swing + i] if rate == 0 else 0.0))
-            begins += sign * (numbers[row + n + i] * numbers[v + i])
-    if rate == 0 and entered == 0 and begins < 0.0:
-        terms = mapped_terms(ints, numbers, CURRENT, ints[level + EXITS] + exit_number * EXIT_INTS)
-        constant -= begins if abs(begins) <= ZERO * (size + terms) else 0.0
+            begins += numbers[row + n + i] * numbers[v + i]
+    may_be_zero = sign * begins <= ZERO * size
+    if may_be_zero and abs(begins) <= ZERO * (size + mapped_size(ints, numbers, CURRENT, signal, rate)):
+        constant -= sign * min(sign * start_value(ints, waves, first, constant), 0.0)
     if sign < 0.0:
         for j in range(p):
             waves[first + j] = -waves[first + j]
-    numbers[ints[CONSTANTS] + count] = constant
+    numbers[ints[CONSTANTS] + count] = sign * constant
     numbers[ints[NOISES] + count] = CLEAR * size
     ints[ints[WAITING] + 2 * count] = exit_number
     ints[ints[WAITING] + 2 * count + 1] = asks
     return count + 1
+
+
+@compiled
+def start_value(ints: Ints, waves: Waves, signal: int, constant: float) -> float:
+    """Return the value of a signal (p,) at the start of the flow."""
+    value, powers = constant, ints[ints[FLOW_BASIS] + POWERS]
+    for j in range(ints[FLOW_COUNT]):
+        value += waves[signal + j].real if ints[powers + j] == 0 else 0.0
+    return value
 
 
 @compiled

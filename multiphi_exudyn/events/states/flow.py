@@ -30,6 +30,7 @@ from multiphi_exudyn.events.arrays import (
     HORIZON,
     LEVEL,
     MAPPED,
+    MAPPED_SPEED,
     MODES,
     MOTION,
     PIECE_NOW,
@@ -56,10 +57,12 @@ from multiphi_exudyn.mathematics.response.basis_arrays import (
     describe_basis,
     differentiate,
     exponentials,
+    magnitude,
 )
 from multiphi_exudyn.mathematics.response.response_arrays import (
     FREE,
     FROM_DISPLACEMENT,
+    FROM_VELOCITY,
     REACHED,
     SHAPES,
     coefficients_of,
@@ -191,10 +194,10 @@ def add_forced(
 
 @compiled
 def size_terms(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
-    """Of which terms (p,) the coefficients of the flow from a state are the sums.
+    """Compute the sizes (p,) of the terms of the coefficients of the flow from a state.
 
-    The transition that has made the state counts: a stiff mode that hardly moves has the round-off of those it is
-    made of, and accelerates with it.
+    The map that has made the state counts: a stiff mode that hardly moves has the round-off of the modes from which it
+    was mapped, and accelerates with it.
     """
     for j in range(ints[FLOW_COUNT]):
         numbers[ints[FLOW_TERMS] + j] = abs(waves[ints[FLOW_WAVES] + j])
@@ -204,8 +207,9 @@ def size_terms(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
     for j in range(ints[FLOW_FREE]):
         reached, size = ints[response + REACHED] + 2 * j, 0.0
         for i in range(ints[reached], ints[reached + 1]):
-            displaced = waves[ints[response + FROM_DISPLACEMENT] + j * r + i]
-            size += abs(displaced) * numbers[ints[state + MAPPED] + i]
+            k = j * r + i
+            size += magnitude(waves, ints[response + FROM_DISPLACEMENT] + k) * numbers[ints[state + MAPPED] + i]
+            size += magnitude(waves, ints[response + FROM_VELOCITY] + k) * numbers[ints[state + MAPPED_SPEED] + i]
         numbers[ints[FLOW_TERMS] + j] += size * unit_of_flow(ints, numbers, ints[response + FREE], j)
 
 

@@ -15,6 +15,7 @@ from multiphi_exudyn.events.arrays import (
     MAP_SLOTS,
     MAP_TERMS,
     MAPPED,
+    MAPPED_SPEED,
     MAPS,
     MATRIX,
     MODES,
@@ -111,10 +112,10 @@ def map_state(
     speed: int,
     sizes: int,
 ) -> None:
-    """xi (rows,) of x (n,) by one map, xi' of v (m,) by that or another one, and the sizes of the terms of xi (rows,).
+    """xi (rows,) of x (n,) by one map, xi' of v (m,) by that or another one, and the sizes (2, rows) of their terms.
 
-    Both at once: they are sums that do not wait for each other. Behind the sizes those of xi', of a map that sets
-    places: it knows the terms of which its own numbers are sums.
+    All at once: they are sums that do not wait for each other. A map that sets places knows the terms of which its own
+    numbers are sums.
     """
     matrix, offset, moving = ints[way + MATRIX], ints[way + OFFSET], n
     rates, rate_offset, sliding = ints[other + RATE_MATRIX], ints[other + RATE_OFFSET], m
@@ -126,18 +127,20 @@ def map_state(
     for i in range(rows):
         total = numbers[offset + i] if offset >= 0 else 0.0
         slope = numbers[rate_offset + i] if rate_offset >= 0 else 0.0
-        size = abs(total)
+        size, slope_size = abs(total), abs(slope)
         for j in range(both):
-            moved = numbers[matrix + j] * numbers[x + j]
-            total += moved
+            total += numbers[matrix + j] * numbers[x + j]
             slope += numbers[rates + j] * numbers[v + j]
-            size += abs(moved)
+            size += abs(numbers[matrix + j]) * abs(numbers[x + j])
+            slope_size += abs(numbers[rates + j]) * abs(numbers[v + j])
         for j in range(both, moving):
             total += numbers[matrix + j] * numbers[x + j]
-            size += abs(numbers[matrix + j] * numbers[x + j])
+            size += abs(numbers[matrix + j]) * abs(numbers[x + j])
         for j in range(both, sliding):
             slope += numbers[rates + j] * numbers[v + j]
-        numbers[place + i], numbers[speed + i], numbers[sizes + i] = total, slope, size
+            slope_size += abs(numbers[rates + j]) * abs(numbers[v + j])
+        numbers[place + i], numbers[speed + i] = total, slope
+        numbers[sizes + i], numbers[sizes + rows + i] = size, slope_size
         matrix += n
         rates += m
     if ints[way + MAP_TERMS] >= 0:
@@ -164,8 +167,8 @@ def size_by_terms(ints: Ints, numbers: Numbers, way: int, part: int, given: int,
 def move(ints: Ints, numbers: Numbers, places: int, speeds: int, level: int, result: int) -> int:
     """xi of the state ``places`` and xi' of ``speeds``, of the same instant, as a state of a level; OK or NEED.
 
-    The sizes of the map's terms are kept for the decisions of this instant: a mode that then hardly moves has the
-    round-off of those that did. Where the map sets places, they belong to the scales of the motion that follows too.
+    The sizes of the map's terms are kept for the decisions of this instant: a mode that hardly moves has the round-off
+    of those from which it was mapped. If the map sets places, they are added to the scales of the following motion.
     """
     here, there = ints[places + LEVEL], ints[speeds + LEVEL]
     way = find_map(ints, here, level)
@@ -184,6 +187,7 @@ def move(ints: Ints, numbers: Numbers, places: int, speeds: int, level: int, res
     sets_places = ints[other + MAP_TERMS] >= 0
     for i in range(ints[level + MODES]):
         numbers[ints[result + MAPPED] + i] = numbers[sizes + i]
+        numbers[ints[result + MAPPED_SPEED] + i] = numbers[sizes + rows + i]
         if sets_places:
             numbers[ints[result + REACH] + i] += numbers[sizes + i]
             numbers[ints[result + SWING] + i] += numbers[sizes + rows + i]

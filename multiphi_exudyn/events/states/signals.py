@@ -9,26 +9,24 @@ from multiphi_exudyn.events.arrays import (
     ACCELERATION,
     ACCELERATION_TERMS,
     CHANNELS,
-    FIRMNESS,
     GAPS,
     LEVEL,
     MAPPED,
+    MAPPED_SPEED,
     MODES,
     PLACE,
     PRESCRIBED,
     RATED,
     REACH,
     ROW,
-    SIGNAL,
     SPEED,
     SWING,
 )
 from multiphi_exudyn.events.states.state_arrays import accelerate, acceleration_sizes
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.round_off import ZERO
-from multiphi_exudyn.mechanics.elements.element import ALWAYS_TAKEN
 
-__all__ = ["gap", "held_part", "mapped_terms", "rate_sign", "row_sign", "sign_of"]
+__all__ = ["gap", "held_part", "mapped_size", "rate_sign", "row_sign", "sign_of"]
 
 
 @compiled
@@ -44,12 +42,13 @@ def row_sign(ints: Ints, numbers: Numbers, state: int, signal: int, terms: float
     """9. Return the sign of a signal, zero if it is round-off of its terms.
 
     At the root of a signal all displacements, or velocities, may be round-off of their earlier values: |eta'| / omega
-    and omega |eta| count too. terms: the size of further terms of the signal.
+    and omega |eta| count too, and the terms of the map that has made the state. terms: the size of further terms of
+    the signal.
     """
     n, row = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW]
     x, v, reach, swing = ints[state + PLACE], ints[state + SPEED], ints[state + REACH], ints[state + SWING]
     rated, value = ints[signal + RATED] == 1, numbers[row + 2 * n]
-    size = abs(value) + terms
+    size = abs(value) + terms + mapped_size(ints, numbers, state, signal, 0)
     for i in range(n):
         term = numbers[row + i] * numbers[x + i]
         size += abs(numbers[row + i]) * numbers[reach + i]
@@ -62,26 +61,31 @@ def row_sign(ints: Ints, numbers: Numbers, state: int, signal: int, terms: float
 
 
 @compiled
-def mapped_terms(ints: Ints, numbers: Numbers, state: int, exit_: int) -> float:
-    """Return the size of the terms of a reaction in the transition that has made a state, zero for other signals.
+def mapped_size(ints: Ints, numbers: Numbers, state: int, signal: int, rate: int) -> float:
+    """Return the size of the terms of a signal, or of its rate, in the map that has made a state, else zero.
 
-    The displacements of two levels may be large where the normal force of a contact is small; a gap is the same in
-    both.
+    The displacements and velocities of two levels may be large where a gap or a contact force is small.
     """
-    if ints[exit_ + FIRMNESS] != ALWAYS_TAKEN:
-        return 0.0
-    row, mapped, total = ints[exit_ + SIGNAL + ROW], ints[state + MAPPED], 0.0
-    for i in range(ints[ints[state + LEVEL] + MODES]):
-        total += abs(numbers[row + i]) * numbers[mapped + i]
-    return total
+    r, row, size = ints[ints[state + LEVEL] + MODES], ints[signal + ROW], 0.0
+    mapped, mapped_speed = ints[state + MAPPED], ints[state + MAPPED_SPEED]
+    if rate == 1:
+        mapped = mapped_speed
+    for i in range(r):
+        size += abs(numbers[row + i]) * numbers[mapped + i]
+    if rate == 0 and ints[signal + RATED] == 1:
+        row += r + ints[CHANNELS]
+        for i in range(r):
+            size += abs(numbers[row + i]) * numbers[mapped_speed + i]
+    return size
 
 
 @compiled
 def rate_sign(ints: Ints, numbers: Numbers, state: int, signal: int) -> int:
     """9. Return the sign of a signal's time derivative, zero if it is round-off of its terms.
 
-    At a turning point all velocities may be round-off of their earlier values: omega |eta| counts too. If the signal
-    depends on velocities, the terms of the accelerations count, as they may cancel.
+    At a turning point all velocities may be round-off of their earlier values: omega |eta| counts too, and so do the
+    terms of the map that has made the state. If the signal depends on velocities, the terms of the accelerations count,
+    as they may cancel.
     """
     n, row = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW]
     v, swing, accelerations, terms = (
@@ -94,7 +98,7 @@ def rate_sign(ints: Ints, numbers: Numbers, state: int, signal: int) -> int:
     if rated:
         accelerate(ints, numbers, state, accelerations)
         acceleration_sizes(ints, numbers, state, terms)
-    value, size = 0.0, 0.0
+    value, size = 0.0, mapped_size(ints, numbers, state, signal, 1)
     for i in range(n):
         term = numbers[row + i] * numbers[v + i]
         size += abs(term) + abs(numbers[row + i]) * numbers[swing + i]

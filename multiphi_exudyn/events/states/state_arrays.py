@@ -16,6 +16,7 @@ from multiphi_exudyn.events.arrays import (
     FREQUENCIES,
     LEVEL,
     MAPPED,
+    MAPPED_SPEED,
     MODES,
     MOTION,
     PERIODS,
@@ -38,15 +39,10 @@ def copy_state(ints: Ints, numbers: Numbers, given: int, result: int) -> None:
     """Copy a state, phases included."""
     ints[result + LEVEL] = ints[given + LEVEL]
     ints[result + SETTLED] = ints[given + SETTLED]
-    x, v, x_copy, v_copy = ints[given + PLACE], ints[given + SPEED], ints[result + PLACE], ints[result + SPEED]
-    reach, mapped, swing = ints[given + REACH], ints[given + MAPPED], ints[given + SWING]
-    reach_copy, mapped_copy, swing_copy = ints[result + REACH], ints[result + MAPPED], ints[result + SWING]
-    for i in range(ints[ints[given + LEVEL] + MODES] + ints[CHANNELS]):
-        numbers[x_copy + i] = numbers[x + i]
-        numbers[v_copy + i] = numbers[v + i]
-        numbers[reach_copy + i] = numbers[reach + i]
-        numbers[mapped_copy + i] = numbers[mapped + i]
-        numbers[swing_copy + i] = numbers[swing + i]
+    for part in range(PLACE, SWING + 1):
+        original, copy = ints[given + part], ints[result + part]
+        for i in range(ints[ints[given + LEVEL] + MODES] + ints[CHANNELS]):
+            numbers[copy + i] = numbers[original + i]
     for i in range(ints[ints[given + LEVEL] + EXIT_COUNT]):
         ints[ints[result + PHASES] + i] = ints[ints[given + PHASES] + i]
 
@@ -68,6 +64,7 @@ def measure(ints: Ints, numbers: Numbers, state: int) -> None:
     sizes = ints[DRIVE] + 3 * q
     for i in range(r + ints[CHANNELS]):
         numbers[ints[state + MAPPED] + i] = 0.0
+        numbers[ints[state + MAPPED_SPEED] + i] = 0.0
     for k in range(ints[CHANNELS]):
         numbers[reach + r + k] = numbers[sizes + k] if k < q else 0.0
         numbers[swing + r + k] = numbers[sizes + q + k] if k < q else 0.0
@@ -106,9 +103,10 @@ def accelerate(ints: Ints, numbers: Numbers, state: int, result: int) -> None:
 def acceleration_sizes(ints: Ints, numbers: Numbers, state: int, result: int) -> None:
     """Compute the sizes (n,) of the terms of the accelerations, and omega |eta'|, which the velocities lead to.
 
-    A displacement counts with the terms of the map that has made it.
+    Displacements and velocities count with the terms of the map that has made them.
     """
-    level, x, v, mapped = ints[state + LEVEL], ints[state + PLACE], ints[state + SPEED], ints[state + MAPPED]
+    level, x, v = ints[state + LEVEL], ints[state + PLACE], ints[state + SPEED]
+    mapped, mapped_speed = ints[state + MAPPED], ints[state + MAPPED_SPEED]
     r, q, sizes = ints[level + MODES], ints[PRESCRIBED], ints[DRIVE] + 3 * ints[PRESCRIBED]
     n = r + ints[CHANNELS]
     row = ints[level + MOTION]
@@ -116,7 +114,7 @@ def acceleration_sizes(ints: Ints, numbers: Numbers, state: int, result: int) ->
         total = abs(numbers[row + 2 * n]) + numbers[ints[level + FREQUENCIES] + i] * abs(numbers[v + i])
         for j in range(r):
             total += abs(numbers[row + j]) * max(abs(numbers[x + j]), numbers[mapped + j])
-            total += abs(numbers[row + n + j] * numbers[v + j])
+            total += abs(numbers[row + n + j]) * max(abs(numbers[v + j]), numbers[mapped_speed + j])
         for k in range(q):
             total += abs(numbers[row + r + k]) * numbers[sizes + k]
             total += abs(numbers[row + n + r + k]) * numbers[sizes + q + k]

@@ -31,11 +31,11 @@ import numpy as np
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.level import Level
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
+from multiphi_exudyn.mathematics.round_off import PRODUCT
 
 __all__ = ["Transition", "modal_projection"]
 
 UNMIXED = 1e-13  # product of two modes, of unit length in either energy, below which they are orthogonal
-PRODUCT = 1e-15  # round-off of such a product alone: smaller ones are zero even if they count in strain energy
 
 
 @dataclass(frozen=True)
