@@ -1,4 +1,4 @@
-"""Phases: what every exit of a state waits for, by sentences 1, 5 and 6 of the law (decision.py).
+"""Phases: what every exit of a state waits for, by sentences 1, 5 and 6 of the law (events/law).
 
 An exit is ARMED, RECOVERING, REFUSED or HELD_BACK. s is its signal.
 """

@@ -1,4 +1,4 @@
-"""Rebounds: rigid contacts with restitution leave their stops after an impact, by sentence 11 of the law (decision.py).
+"""Rebounds: rigid contacts with restitution leave their stops after an impact, by sentence 11 of the law (events/law).
 
     H v+ + e H v- >= 0,  p >= 0, complementary;  WANTED = -e H v-                                            (Moreau)
 

@@ -1,4 +1,4 @@
-"""Rigid contacts at rest right after an impact: which of them stay closed, by sentence 2 of the law (decision.py).
+"""Rigid contacts at rest right after an impact: which of them stay closed, by sentence 2 of the law (events/law).
 
 STRUCK        the state after the impact, in the level in which all touching contacts are open
 STILL, AFTER  the same without negligible speeds, and in the level in which the contacts of CLOSED are closed

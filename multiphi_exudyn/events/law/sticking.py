@@ -1,4 +1,4 @@
-"""Rigid friction elements at rest are decided together, by sentence 12 of the law (decision.py).
+"""Rigid friction elements at rest are decided together, by sentence 12 of the law (events/law).
 
     h.x'' = A eta'' = A eta''_0 + A A^T z,   -limit <= f <= limit complementary to h.x'',   f = f_0 + z
 

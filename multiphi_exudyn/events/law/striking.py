@@ -1,4 +1,4 @@
-"""Rigid contacts that close, with or without an impact, by sentence 2 of the law (decision.py)."""
+"""Rigid contacts that close, with or without an impact, by sentence 2 of the law (events/law)."""
 
 from __future__ import annotations
 

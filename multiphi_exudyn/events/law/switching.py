@@ -1,4 +1,4 @@
-"""Compliant contacts change, rigid ones open, by sentences 3, 4 and 7 of the law (decision.py)."""
+"""Compliant contacts change, rigid ones open, by sentences 3, 4 and 7 of the law (events/law)."""
 
 from __future__ import annotations
 

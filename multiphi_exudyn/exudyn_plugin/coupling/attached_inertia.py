@@ -10,7 +10,7 @@ impulse i on the body then changes its velocity by
 
 and -X R i is the impulse on it at the points. If R v in a new level's modes has an error e (m,), its velocity changes
 by -R^T X e. The accelerations of contacts at rest follow the same equation. A contact that attached parts leave no
-mobility stays open at its stop without a force, as does one that closed contacts leave none (events/decision.py).
+mobility stays open at its stop without a force, as does one that closed contacts leave none (events/law).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Loop: a run from event to event, in flat arrays (events/arrays.py). There is no time step.
 
 Within a level the motion is a sum of exponentials; the next event is the certified first descent of a few of them
-(zero_crossing.py); the event rule (decision.py) gives the state that follows. Nothing of a segment is kept before it
+(zero_crossing.py); the event rule (events/law) gives the state that follows. Nothing of a segment is kept before it
 is complete: where the arrays lack something (NEED), or the record is full (FULL), the caller supplies it and calls the
 loop again, which computes the segment anew from its start.
 """

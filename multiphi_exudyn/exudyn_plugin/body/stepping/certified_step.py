@@ -1,6 +1,6 @@
 """Certified test that no event occurs within a time step, from the states at its two ends.
 
-For the signal s of an exit (events/decision.py) the cubic Hermite interpolant of s, s' at both ends has an error of at
+For the signal s of an exit (events/law) the cubic Hermite interpolant of s, s' at both ends has an error of at
 most h^4/384 max|s''''|, and it is not less than the smallest of its Bernstein coefficients: s > 0 on the whole step if
 
     min(s0, s0 + h s0'/3, s1 - h s1'/3, s1) > h^4/384 |[P R] A^3 S^-1| max |S z'| exp(sigma h)
