@@ -267,6 +267,34 @@ class TestFirst:
         assert_allclose(search.descent(3.0).time, 2 * np.pi / 3, rtol=1e-14)
         assert search.samples > 0
 
+    @pytest.mark.parametrize("decay", [0.0, 0.3])
+    def test_what_its_drift_keeps_above_zero_is_not_sampled(self, decay):
+        """10 - t + cos(50 t) exp(-decay t) falls where its drift is about one, or less if the cosine has decayed."""
+        own = basis([50j - decay, 0, 0], [0, 0, 1])
+        search = Search(own, signals([1.0, 4.0, -1.0], constants=[6.0]))
+        found, t = search.descent(20.0).time, np.linspace(0.0, 12.0, 2_000_001)
+        assert_allclose(found, t[np.argmax(10 - t + np.cos(50 * t) * np.exp(-decay * t) < 0)], atol=1e-5)
+        assert search.samples < 30
+
+    def test_a_drift_that_exceeds_all_else_up_to_the_horizon_needs_no_samples(self):
+        search = Search(basis([50j, 0, 0], [0, 0, 1]), signals([1.0, 0.0, -1.0], constants=[10.0]))
+        assert search.descent(8.9) is None
+        assert search.samples == 0
+
+    def test_of_many_signals_on_few_exponentials_no_drift_hides_a_fall(self):
+        """1 - t^2 beside four signals that rise."""
+        rows = np.zeros((5, 3))
+        rows[0, 2], rows[1:, 1] = -1.0, 1.0
+        assert_allclose(
+            first(basis(np.zeros(3), [0, 1, 2]), signals(*rows, constants=np.ones(5)), 3.0), 1.0, rtol=1e-14
+        )
+
+    def test_a_drift_that_rises_is_judged_at_its_start(self):
+        """0.5 + t + cos(50 t), soon far above zero, falls before."""
+        found = first(basis([50j, 0, 0], [0, 0, 1]), signals([1.0, 0.0, 1.0], constants=[0.5]), 5.0)
+        t = np.linspace(0.0, 0.1, 1_000_001)
+        assert_allclose(found, t[np.argmax(0.5 + t + np.cos(50 * t) < 0)], atol=2e-7)
+
     @pytest.mark.parametrize("phase", [0.0, 1.0, 2.0, 4.0])
     def test_of_two_opposite_signals_each_is_found(self, phase):
         """-0.97 < cos(t + phase) + 0.3 exp(-t / 2) < 1.28: the limit that is reached first."""

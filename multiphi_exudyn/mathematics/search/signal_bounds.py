@@ -32,6 +32,7 @@ __all__ = [
     "all_above",
     "all_finite",
     "bound",
+    "drift_above",
     "power_of_two_above",
     "round_off",
     "sample_distance",
@@ -113,6 +114,43 @@ def all_above(numbers: Numbers, constants: int, bounds: int, count: int) -> int:
         if not numbers[constants + s] > numbers[bounds + PER_SIGNAL * s]:
             return 0
     return 1
+
+
+@compiled
+def drift_above(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    basis: int,
+    signals: int,
+    constants: int,
+    bounds: int,
+    count: int,
+    start: float,
+    latest: float,
+) -> float:
+    """Return until when, at most ``latest``, the drift of every signal keeps it above zero; ``start`` for not at all.
+
+    The drift is the constant and the terms without exponential that are constant or linear in time. It exceeds the
+    bounds of the other terms from the start on, as ``bound`` has set them.
+    """
+    p, powers, rates = ints[basis + SIZE], ints[basis + POWERS], ints[basis + RATES]
+    envelope, until = bounds + PER_SIGNAL * count + 2 * p, latest
+    for s in range(count):
+        value, slope = numbers[constants + s], 0.0
+        for j in range(p):
+            a = signals + s * p + j
+            if waves[rates + j] != 0 or ints[powers + j] > 1:
+                value -= magnitude(waves, a) * numbers[envelope + j]
+            elif ints[powers + j] == 1:
+                slope += waves[a].real / numbers[ints[basis + SCALES]]
+            else:
+                value += waves[a].real
+        if not value + slope * start > 0.0:
+            return start
+        if not value + slope * until > 0.0:
+            until = -value / slope
+    return until
 
 
 @compiled

@@ -11,7 +11,8 @@ coefficients:
 
 proves that an interval holds no root. Intervals are wider where all signals are far from zero; an undecided one is
 divided until certified monotony or curvature decides, and an inverse Taylor series gives the root. A touch without
-crossing is no descent. The result does not depend on the samples.
+crossing is no descent. Where the drift of every signal, its terms without exponential, exceeds the bounds of its other
+terms there is no search. The result does not depend on the samples.
 
 Source of the bounds: P. J. Davis, Interpolation and Approximation, 1963, ch. 3; G. Farin, Curves and Surfaces
 for CAGD, ch. 5.
@@ -44,6 +45,7 @@ from multiphi_exudyn.mathematics.search.signal_bounds import (
     all_above,
     all_finite,
     bound,
+    drift_above,
     sample_distance,
 )
 from multiphi_exudyn.mathematics.search.signal_starts import near_descent, sample_start, stay_above
@@ -66,6 +68,7 @@ RESULT = 4  # numbers: time of the descent; total samples; sample distance and r
 
 PATIENCE = 1000  # blocks, less than a second, after which a search checks how many remain,
 MOST_BLOCKS = 1_000_000  # at most: minutes
+SKIPPED = 12.0  # sample distances that are searched also where drift exceeds: bounds from their end cost as much
 WINDOW = 1.0  # of the time in which the fastest growing exponential grows e-fold: bounds hold for at most twice this
 SIMULTANEOUS = 1e-11  # of sum |a_j|: a falling signal farther from zero at another's root has a later root,
 INSTANT = 1e-9  # of 1 / max |lambda|: and so has a nearer one that needs more time, unless it is round-off
@@ -114,6 +117,11 @@ def first_descent(
             break
         if all_finite(numbers, constants, bounds, count) == 0:
             return NOT_FINITE
+        later = begin
+        if ints[basis + PURE] == 0:
+            later = drift_above(ints, numbers, waves, basis, signals, constants, bounds, count, begin, window_end)
+            if later >= horizon:
+                break
         if begin == 0.0:
             sample_start(ints, numbers, waves, basis, signals, constants, bounds, count)
             if window_end == horizon and stay_above(numbers, constants, noise, bounds, count, horizon) == 1:
@@ -126,6 +134,9 @@ def first_descent(
                 falling = falling if numbers[suspect + ROOT] <= horizon else NONE
                 break
         step = sample_distance(numbers, constants, bounds, count, window_end - begin)
+        if later > begin + SKIPPED * step:
+            begin = later - step  # where no signal is zero
+            continue
         has_factors, previous_step = 1 if step == previous_step else 0, step
         blocks += 1
         if blocks > PATIENCE and horizon - begin > MOST_BLOCKS * INTERVALS * step:

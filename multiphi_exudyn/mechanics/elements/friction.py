@@ -12,6 +12,7 @@ J. Appl. Mech. 33 (1966).
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import ClassVar
@@ -117,7 +118,7 @@ class Friction:
         """True without a spring in series."""
         return math.isinf(self.stiffness)
 
-    @property
+    @functools.cached_property
     def states(self) -> tuple[ElementState, ...]:
         """Stick, slip+ and slip-."""
         exits = tuple(Exit(f"slip{s}", force=float(f"{s}1"), constant=self.most, firmness=ALWAYS_TAKEN) for s in "+-")

@@ -25,7 +25,7 @@ import numpy as np
 
 from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.exits import signal_row, state_of
+from multiphi_exudyn.events.transitions.exits import signal_table, state_of
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.levels.model import MultiPhiModel
 from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
@@ -179,9 +179,10 @@ def _backward_slip(segments: Segments) -> Iterator[str]:
 
 
 def _slip_row(element: int, sticks: int, level: LoadedLevel) -> np.ndarray:
-    """s (h_t.x' - v_t - T'/k_t) [m/s] of an element while it slips, else zero."""
-    width = level.width
-    if level.states[element] <= sticks:
-        return np.zeros(2 * width + 1)
-    row = signal_row(level, element, state_of(level, element).exits[0])
-    return np.concatenate([row.position, row.rate, [row.constant]])
+    """s (h_t.x' - v_t - T'/k_t) [m/s] of an element while it slips, else zero; the level keeps it."""
+    key = "slip", element
+    if key not in level.entries:
+        slips, exit_ = level.states[element] > sticks, state_of(level, element).exits[0]
+        level.entries[key] = signal_table(level, [(element, exit_)])[0] if slips else np.zeros(2 * level.width + 1)
+    row: np.ndarray = level.entries[key]
+    return row
