@@ -193,8 +193,8 @@ def missed(
     """No contact leaves the admissible range of its state without an event: s >= 0 (events/law).
 
     In a truncated basis this is checked for armed contacts and for closed rigid ones, which never pull. Round-off is
-    that of the whole run: an impact that stops all motion leaves a state that is round-off of the one before. A reaction
-    is zero to the law where it is within ZERO of the terms that coordinates of the run make of it. A static response on
+    that of the whole run: an impact that stops all motion leaves a state that is round-off of the one before. To the law
+    a reaction is zero where it is within ZERO of the terms that coordinates of the run make of it. A static response on
     stiff contacts is a small difference of the one without them, and a gap has its round-off.
     """
     complete, reach = _complete(run), _reach(segments, SMALLEST * metre)
