@@ -46,7 +46,7 @@ from multiphi_exudyn.events.arrays import (
     WORKED,
 )
 from multiphi_exudyn.events.states.flow import expand, signal_sizes, signal_waves
-from multiphi_exudyn.events.states.signals import held_part, rate_sign, row_sign
+from multiphi_exudyn.events.states.signals import held_part, mapped_size, rate_sign, row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.search.zero_crossing import first_sign
 from multiphi_exudyn.mechanics.elements.element import ALWAYS_TAKEN, MAY_RECOVER, TAKEN_ONCE
@@ -69,8 +69,10 @@ __all__ = [
 @compiled
 def phase_of(ints: Ints, numbers: Numbers, waves: Waves, state: int, exit_: int) -> int:
     """1, 5. ARMED where s is or becomes positive, RECOVERING where it is negative and may rise, else REFUSED."""
-    signal = exit_ + SIGNAL
-    value = row_sign(ints, numbers, state, signal, 0.0)
+    signal, mapped = exit_ + SIGNAL, 0.0
+    if ints[exit_ + FIRMNESS] == ALWAYS_TAKEN:  # a reaction; gaps and velocities are the same in both levels
+        mapped = mapped_size(ints, numbers, state, signal, 0)
+    value = row_sign(ints, numbers, state, signal, mapped)
     if value > 0:
         return ARMED
     rate = rate_sign(ints, numbers, state, signal)

@@ -42,13 +42,12 @@ def row_sign(ints: Ints, numbers: Numbers, state: int, signal: int, terms: float
     """9. Return the sign of a signal, zero if it is round-off of its terms.
 
     At the root of a signal all displacements, or velocities, may be round-off of their earlier values: |eta'| / omega
-    and omega |eta| count too, and the terms of the map that has made the state. terms: the size of further terms of
-    the signal.
+    and omega |eta| count too. terms: the size of further terms of the signal.
     """
     n, row = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW]
     x, v, reach, swing = ints[state + PLACE], ints[state + SPEED], ints[state + REACH], ints[state + SWING]
     rated, value = ints[signal + RATED] == 1, numbers[row + 2 * n]
-    size = abs(value) + terms + mapped_size(ints, numbers, state, signal, 0)
+    size = abs(value) + terms
     for i in range(n):
         term = numbers[row + i] * numbers[x + i]
         size += abs(numbers[row + i]) * numbers[reach + i]

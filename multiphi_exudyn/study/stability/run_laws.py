@@ -30,8 +30,7 @@ LAW = 1e-8  # of the same: a complete basis' violation of the law of contact
 DIFFERENCE = 1e-2  # of a level's potential: energies are differences of it; of CLOSES it is round-off, of omega^2 too
 PASSED = 1e-5  # the same of what a start, an instant or a sum passes through: a few round-offs of its potential
 SMALLEST = 1e-6  # J, m: less is round-off in cases whose masses, stiffnesses and gaps are about 1
-ROUND_OFFS = 8  # of a time, and of a static response: they are known to so many
-EPSILON = np.finfo(float).eps
+ROUND_OFFS = 8  # of the time: an instant is known to so many
 INSTANT = 1e-12  # of the run: a shorter segment has no times of its own
 INSIDE = 5  # instants of a segment at which its reach is read
 
@@ -193,12 +192,10 @@ def missed(
     """No contact leaves the admissible range of its state without an event: s >= 0 (events/law).
 
     In a truncated basis this is checked for armed contacts and for closed rigid ones, which never pull. Round-off is
-    that of the whole run: an impact that stops all motion leaves a state that is round-off of the one before. To the law
-    a reaction is zero where it is within ZERO of the terms that coordinates of the run make of it. A static response on
-    stiff contacts is a small difference of the one without them, and a gap has its round-off.
+    that of the whole run: an impact that stops all motion leaves a state that is round-off of the one before, and a
+    reaction is zero to the law where it is within ZERO of the terms that coordinates of the run make of it.
     """
     complete, reach = _complete(run), _reach(segments, SMALLEST * metre)
-    deflection = np.max(np.abs(run.model.level(()).asymptotic(run.load).configuration), initial=0.0)
     largest: dict[tuple[int, str], float] = {}
     checked = list(_signals(segments, run, complete))
     for segment, contact, _, signal in checked:
@@ -210,9 +207,8 @@ def missed(
             continue
         size = largest[contact, signal.of]
         lowest, at = signal.lowest(segment.end - segment.start, samples)
-        unresolved = ROUND_OFFS * EPSILON * segment.end * signal.steepness(at) + ZERO * signal.grain * reach
-        if signal.of == "gap":
-            unresolved += ROUND_OFFS * EPSILON * signal.arm * deflection
+        unresolved = ROUND_OFFS * np.finfo(float).eps * segment.end * signal.steepness(at)
+        unresolved += ZERO * signal.grain * reach
         if lowest < -(MISSED if armed else LAW) * size - unresolved:
             name = run.model.contacts[contact].name
             return f"missed: {name} at {segment.start + at:.9g} s, {lowest / size:g} of its size"
