@@ -45,13 +45,19 @@ def sizes(run):
     return (numbers[LOOKED + 1], numbers[LOOKED + 2]) if whole else None
 
 
+def recorded(run, end):
+    """The same from the record, without the energy where no load acts: there the loop does not look for it."""
+    square, energy = as_segments(run.segments).sizes(end)
+    return square, 0.0 if run.ending.record.arrays.levels.isolated else energy
+
+
 @pytest.mark.parametrize("compiled", [None, False], ids=["compiled", "plain"])
 @pytest.mark.parametrize("stiffness", [1e6, math.inf])
 @pytest.mark.parametrize("loads", LOADS.values(), ids=LOADS)
 def test_what_the_loop_sees_is_what_the_record_tells(loads, stiffness, compiled):
     first, second = runs(model(4, stiffness), loads=loads, compiled=compiled)
     assert sizes(first) is None
-    assert sizes(second) == pytest.approx(as_segments(second.segments).sizes(END), rel=1e-9)
+    assert sizes(second) == pytest.approx(recorded(second, END), rel=1e-9)
     assert first.warnings == second.warnings
     assert any(sentence.startswith("truncation:") for sentence in second.warnings)
 
@@ -105,14 +111,14 @@ def test_a_run_that_goes_on_is_looked_at_from_there():
     for loads in LOADS.values():
         for _ in range(2):
             run = mp.simulate(given, 1.7 * END, start=first, loads=loads)
-        assert sizes(run) == pytest.approx(as_segments(run.segments).sizes(1.7 * END), rel=1e-9)
+        assert sizes(run) == pytest.approx(recorded(run, 1.7 * END), rel=1e-9)
 
 
 def test_a_run_without_displacement_at_its_start_is_looked_at():
     given = model(4)
     for _ in range(2):
         run = mp.simulate(given, END, velocity=40 * BENT)
-    assert sizes(run) == pytest.approx(as_segments(run.segments).sizes(END), rel=1e-9)
+    assert sizes(run) == pytest.approx(recorded(run, END), rel=1e-9)
 
 
 def test_a_motion_carried_in_steps_is_not_taken_for_one_that_was_looked_at():
@@ -124,7 +130,7 @@ def test_a_motion_carried_in_steps_is_not_taken_for_one_that_was_looked_at():
         motion.advance(end)
     run = motion.trajectory(END)
     assert sizes(run) is None
-    assert as_segments(run.segments).sizes(END) == pytest.approx(sizes(whole), rel=1e-9)
+    assert recorded(run, END) == pytest.approx(sizes(whole), rel=1e-9)
     again = Run(given, END, BENT).begun()
     again.continue_from(whole.final, END)
     again.advance(1.5 * END)

@@ -18,6 +18,7 @@ from multiphi_exudyn.events.arrays import (
     FLOW_BASIS,
     GIVEN_SQUARE,
     INSTANT_TIME,
+    ISOLATED,
     LAST_DECISION,
     LEVEL,
     LOOK_END,
@@ -77,9 +78,10 @@ def sample_motion_size(ints: Ints, numbers: Numbers, waves: Waves) -> None:
 
     Before the first decision the later truncation is unknown, so every segment is sampled but one that ends the run.
     A level has the rows of its size (SIZES) only once they were requested there (sampling.py); without them sampling
-    ends.
+    ends. Where no load acts the energy is largest at the start, and is not sampled.
     """
     first, end, level, samples_here = numbers[LOOK_FIRST], numbers[LOOK_END], ints[CURRENT + LEVEL], 0
+    loaded = 1 - ints[ISOLATED]
     for part in range(LOOK_WIDTH):
         numbers[SEEN + part] = numbers[LOOKED + part]
     while end > first and numbers[SEEN] < SAMPLES:
@@ -95,22 +97,27 @@ def sample_motion_size(ints: Ints, numbers: Numbers, waves: Waves) -> None:
         if samples_here > 0 and ints[ints[FLOW_BASIS] + PURE] == 1:
             step, again = (end - first) / (SAMPLES - 1), 1 if samples_here > 1 else 0
             next_state(ints, numbers, waves, level, step, again, ints[AFTER + PLACE], ints[AFTER + SPEED])
-            add_sample(ints, numbers, level, weight)
+            add_sample(ints, numbers, level, weight, loaded)
         else:
-            add_sample_at(ints, numbers, waves, level, t - numbers[TIME], weight)
+            add_sample_at(ints, numbers, waves, level, t - numbers[TIME], weight, loaded)
         samples_here += 1
 
 
 @compiled
-def add_sample_at(ints: Ints, numbers: Numbers, waves: Waves, level: int, delay: float, weight: float) -> None:
-    """Add the flow a ``delay`` [s] after its state to SEEN: number of samples, weighted mean |y|^2, largest energy."""
+def add_sample_at(
+    ints: Ints, numbers: Numbers, waves: Waves, level: int, delay: float, weight: float, has_energy: int
+) -> None:
+    """Add the flow a ``delay`` [s] after its state to SEEN: number of samples, weighted mean |y|^2, largest energy.
+
+    has_energy: 0 where its energy is not asked for.
+    """
     ints[AFTER + LEVEL] = level
     state_at(ints, numbers, waves, level, delay, ints[AFTER + PLACE], ints[AFTER + SPEED])
-    add_sample(ints, numbers, level, weight)
+    add_sample(ints, numbers, level, weight, has_energy)
 
 
 @compiled
-def add_sample(ints: Ints, numbers: Numbers, level: int, weight: float) -> None:
+def add_sample(ints: Ints, numbers: Numbers, level: int, weight: float, has_energy: int) -> None:
     """Add the state AFTER, of a level, to SEEN."""
     x, n, row = ints[AFTER + PLACE], ints[level + MODES] + ints[CHANNELS], ints[level + SIZES]
     square = 0.0
@@ -120,11 +127,13 @@ def add_sample(ints: Ints, numbers: Numbers, level: int, weight: float) -> None:
             size += numbers[row + c] * numbers[x + c]
         square += size * size
         row += n + 1
+    numbers[SEEN] += 1.0
+    numbers[SEEN + 1] += weight * square / (SAMPLES - 1)
+    if has_energy == 0:
+        return
     total_energy = energy(ints, numbers, AFTER) + numbers[row + n]
     for c in range(n):
         total_energy += numbers[row + c] * numbers[x + c]
-    numbers[SEEN] += 1.0
-    numbers[SEEN + 1] += weight * square / (SAMPLES - 1)
     numbers[SEEN + 2] = max(numbers[SEEN + 2], abs(total_energy))
 
 

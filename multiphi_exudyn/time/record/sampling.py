@@ -163,7 +163,7 @@ def sample_sizes(
         if expanded != i and restart_segment(ints, numbers, waves, rows, coordinates, offsets, i, 1.0) == NEED:
             return NEED
         expanded, weight = i, 0.5 if k == 0 or k == SAMPLES - 1 else 1.0
-        add_sample_at(ints, numbers, waves, level, t - instants[i], weight)
+        add_sample_at(ints, numbers, waves, level, t - instants[i], weight, 1)
     return OK
 
 

@@ -66,19 +66,19 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     All warnings but those of truncation are the same for runs of one length in the same levels, and are cache for them,
     unless friction or the model's own check needs the motion of every run.
     """
-    segments = trajectory.segments
-    if not segments:
-        return ()
     record, model = trajectory.ending.record, trajectory.model
-    key, cache = (record.visited, trajectory.t_end, trajectory.start.time), record.arrays.levels.told
+    visited, cache = record.visited, record.arrays.levels.told
+    if not visited:
+        return ()
+    key = visited, trajectory.t_end, trajectory.start.time
     entry = cache.find(key)
     if entry is None:
-        general = ModelWarnings.of(model, segments)
+        general = ModelWarnings.of(model, trajectory.segments)
         entry = general, *general.for_run(trajectory)
         if not general.needs_motion:
             cache.keep(key, entry)
     general, before, after = entry
-    share, error = segments.verdict
+    share, error = trajectory.segments.verdict
     if tolerance is not None or not (share >= 0 and error >= 0):
         share, error = verdict_of(trajectory, tolerance)
     if not (share > 0 or error > 0):

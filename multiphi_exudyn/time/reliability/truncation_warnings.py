@@ -18,7 +18,7 @@ from multiphi_exudyn.time.warnings.model_warnings import REMEDY
 
 __all__ = ["energy_warning", "indicator_threshold", "truncation_warnings", "verdict_of"]
 
-TEXTS = 64  # sentences of each kind that are kept, by their number
+TEXTS = 64  # verdicts whose sentences are kept
 RIGID_INDICATOR = 0.05  # threshold where a rigid contact is struck: impacts raise the indicator more than the error
 
 
@@ -54,6 +54,12 @@ def truncation_warnings(
     share, error = verdict
     if tolerance is not None and error > tolerance.error:
         return energy_warning(share) + _tolerance_warning(model, error, tolerance)
+    return _sentences(share, error, struck)
+
+
+@functools.lru_cache(TEXTS)
+def _sentences(share: float, error: float, struck: bool) -> tuple[str, ...]:
+    """Warnings of a verdict on a run whose modes no tolerance has decided."""
     return energy_warning(share) + _motion_warning(error, struck)
 
 
@@ -66,7 +72,6 @@ def _tolerance_warning(model: MultiPhiModel, error: float, tolerance: Tolerance)
     )
 
 
-@functools.lru_cache(TEXTS)
 def energy_warning(share: float) -> tuple[str, ...]:
     """Warning of the energy lost, a share of the largest energy of the run; none where the share is zero."""
     if not share > 0:
@@ -74,7 +79,6 @@ def energy_warning(share: float) -> tuple[str, ...]:
     return (f"lost energy: truncation took {per_cent(share)} of the largest energy of the run; {REMEDY}",)
 
 
-@functools.lru_cache(TEXTS)
 def _motion_warning(error: float, struck: bool) -> tuple[str, ...]:
     """Warning of the estimated error, on average four times the true one where a rigid contact was struck."""
     if not error > (RIGID_INDICATOR if struck else INDICATOR):
