@@ -97,8 +97,8 @@ def wait_for(
 ) -> int:
     """List the signal of an exit, or the one ``entered``, times ``sign``, or its rate; count + 1.
 
-    A value below zero that is round-off, of its own terms or of the map that has made CURRENT, was judged zero. The
-    signal then starts at zero: the exponentials, which sum up to it, have a round-off of their own.
+    A start value that is round-off, of its own terms or of the map that has made CURRENT, counts as zero. If the sum of
+    the exponentials, which has a round-off of its own, is below zero there, the signal is shifted to start at zero.
     """
     level = ints[CURRENT + LEVEL]
     signal = entered if entered > 0 else ints[level + EXITS] + exit_number * EXIT_INTS + SIGNAL
