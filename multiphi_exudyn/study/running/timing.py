@@ -11,7 +11,7 @@ __all__ = ["repeated", "timed"]
 T = TypeVar("T")
 
 REPEAT_BUDGET_S = 2.0  # s; a run that takes longer is timed once
-STEADY_S = 0.1  # s, over which short runs are repeated: a machine's speed varies
+STEADY_S = 0.3  # s, over which short runs are repeated: a machine's speed varies
 
 
 def timed(run: Callable[[], T]) -> tuple[T, float]:
