@@ -108,8 +108,7 @@ def _force_rows(
     if any(rigid):
         directions = base.directions[:, closed]
         pinned = directions[:, rigid]
-        spring_forces = None if all(rigid) else directions @ forces
-        forces[rigid] = _reaction_rows(base, pinned, squares, vectors, spring_forces)
+        forces[rigid] = _reaction_rows(base, pinned, squares, vectors, directions @ forces)
         rates[rigid] = least_squares(pinned, damped)
     return forces, rates
 
@@ -172,20 +171,17 @@ def _rigid_body_modes(base: ModalBase, closed_directions: ClosedDirections) -> i
 
 
 def _reaction_rows(
-    base: ModalBase, pinned: np.ndarray, squares: np.ndarray, vectors: np.ndarray, spring_forces: np.ndarray | None
+    base: ModalBase, pinned: np.ndarray, squares: np.ndarray, vectors: np.ndarray, spring_forces: np.ndarray
 ) -> np.ndarray:
     """Return the reactions (c, r) of every mode: (Omega^2 - omega^2) psi - (force of the springs) = H_r rho.
 
-    Weighted by 1 / (Omega^2 + |omega^2|), in which no mode of the base outweighs the others. spring_forces: (m, r), or
-    None.
+    Weighted by 1 / (Omega^2 + |omega^2|), in which no mode of the base outweighs the others. spring_forces: (m, r).
     """
     total = base.squares + np.abs(squares)[:, None]  # a row for every mode, as vectors stand in memory
     if not total[:, 0].all():
         smallest = np.min(np.where(total > 0, total, np.inf), axis=1, initial=np.inf, keepdims=True)
         total = np.where(total > 0, total, np.where(np.isinf(smallest), 1.0, smallest))
-    residuals = (base.squares - squares[:, None]) * vectors.T
-    if spring_forces is not None:
-        residuals -= spring_forces.T
+    residuals = (base.squares - squares[:, None]) * vectors.T - spring_forces.T
     if pinned.shape[1] == 1:
         along = pinned[:, 0]
         weighted = along / total

@@ -37,6 +37,7 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.modal_base import ModalBase
 from multiphi_exudyn.mathematics.eigenproblems.modes import right_singular_vectors
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import without
 from multiphi_exudyn.mathematics.eigenproblems.secular_equation import rank_one_modes
 
 __all__ = ["level_modes"]
@@ -113,9 +114,7 @@ def _rank_one_change(
         return None
     squares, vectors = lowest
     if math.isinf(stiffness):
-        vectors -= np.outer(
-            direction @ vectors, direction / (direction @ direction)
-        ).T  # transposed as the vectors are in memory
+        vectors = without(direction[:, None], vectors)
     return squares, vectors, 0.0
 
 

@@ -225,11 +225,15 @@ class LevelArrays:
         elif self.ints[a.NEEDED] == a.NEED_POWERS:
             self.add_powers(source)
         elif self.ints[a.NEEDED] == a.NEED_SIZES:
-            put_sizes(self.buffers, source, self.loaded[int(self.ints[source + a.NUMBER])])
+            put_sizes(self.buffers, source, self._loaded_in(source))
         elif self.ints[a.NEEDED] == a.NEED_STRUCK:
-            put_struck(self.buffers, source, self.loaded[int(self.ints[source + a.NUMBER])])
+            put_struck(self.buffers, source, self._loaded_in(source))
         else:
             self._supply_room()
+
+    def _loaded_in(self, record: int) -> LoadedLevel:
+        """Return the level that a record is of."""
+        return self.loaded[int(self.ints[record + a.NUMBER])]
 
     def _supply_room(self) -> None:
         """Enlarge the memory to the powers of time that a response to a term has."""
@@ -265,7 +269,7 @@ class LevelArrays:
     def add_powers(self, level: int) -> None:
         """Pack the powers of damping, of varying loads and of friction in a level that is packed."""
         if not self.ints[level + a.DISSIPATION]:
-            put_powers(self.buffers, level, self.loaded[int(self.ints[level + a.NUMBER])], self.channels.carriers)
+            put_powers(self.buffers, level, self._loaded_in(level), self.channels.carriers)
 
     def add_strain(self, states: tuple[int, ...]) -> None:
         """Pack the strain energy of a level, if the level is packed, for runs that end in it."""
@@ -275,10 +279,10 @@ class LevelArrays:
 
     def _add_entered(self, source: int, exit_number: int) -> None:
         """Pack the signal that an exit's element would have in the level entered alone."""
-        level = self.loaded[int(self.ints[source + a.NUMBER])]
+        level = self._loaded_in(source)
         element, exit_ = exits_of(level)[exit_number]
         entered = self.level(after(level, element, entering_exit(exit_)))  # may replace the buffers
-        target = self.loaded[int(self.ints[entered + a.NUMBER])]
+        target = self._loaded_in(entered)
         row = entered_row(self.levels.transition(level, target), element)
         signal = self.buffers.put("ints", put_signal(self.buffers.put, level, row))
         record = int(self.ints[source + a.EXITS]) + a.EXIT_INTS * exit_number
@@ -296,12 +300,12 @@ class LevelArrays:
 
     def _map(self, source: int, target: int) -> int:
         """Pack the map between two levels and return its record."""
-        put, level = self.buffers.put, self.loaded[int(self.ints[target + a.NUMBER])]
+        put, level = self.buffers.put, self._loaded_in(target)
         sizes, terms, transition = np.zeros(0), None, None
         if source == self.base:
             matrix, offset, rate_matrix, sizes = from_base(level)
         else:
-            transition = self.levels.transition(self.loaded[int(self.ints[source + a.NUMBER])], level)
+            transition = self.levels.transition(self._loaded_in(source), level)
             matrix, offset, rate_matrix = transition.matrix, transition.offset, transition.velocity_matrix
             terms = transition.terms
         matrix_at = put("numbers", matrix)

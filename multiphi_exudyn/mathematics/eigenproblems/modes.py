@@ -138,7 +138,7 @@ def _signs(values: np.ndarray, shapes: np.ndarray, sizes: np.ndarray) -> np.ndar
 def _clusters(squares: np.ndarray) -> list[tuple[int, int]]:
     """Return the first and one past the last mode of every cluster of two or more equal omega^2, ascending."""
     steps = enumerate(itertools.pairwise(squares.tolist()), start=1)
-    ends = [k for k, (below, above) in steps if above - below > EQUAL * max(-below, above)]
+    ends = [k for k, (below, above) in steps if above - below > EQUAL * max(abs(below), abs(above))]
     if len(ends) == len(squares) - 1:
         return []
     return [(first, last) for first, last in itertools.pairwise([0, *ends, len(squares)]) if last - first > 1]
