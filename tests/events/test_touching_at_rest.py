@@ -26,7 +26,7 @@ def check_contact_laws(run):
     assert abs(run.ledger.residual) < 1e-10 * run.ledger.initial
 
 
-@pytest.mark.parametrize("seed", [14, 19, 39, 40, 42, 52, 59])
+@pytest.mark.parametrize("seed", [14, 19, 39, 40, 42, 52, 59, 104])
 def test_between_a_rigid_and_a_stiff_stop_without_clearance_a_body_changes_from_one_to_the_other(seed):
     """It leaves the rigid stop at zero acceleration, or strikes it from the spring.
 
@@ -40,7 +40,7 @@ def test_between_a_rigid_and_a_stiff_stop_without_clearance_a_body_changes_from_
     assert len(run.contact_intervals("stop")) >= 3
 
 
-@pytest.mark.parametrize("seed", [6, 12, 19, 33, 46])
+@pytest.mark.parametrize("seed", [6, 12, 19, 33, 46, 84])
 def test_it_does_so_beside_a_stiffer_stop_at_another_point(seed):
     random = np.random.default_rng(seed)
     structure = LinearStructure(np.eye(2), [[200, -100], [-100, 100]], points={"m0": 0, "m1": 1})
