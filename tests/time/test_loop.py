@@ -268,7 +268,7 @@ def test_warnings_and_the_ledger_of_a_warm_run_take_few_calls():
     for _ in range(3):
         run = mp.simulate(model, 1.0, displacement=start)
         assert run.ledger.final > 0  # what it is read from is packed
-    assert len(run.warnings) == 3
+    assert len(run.warnings) == 2
     assert calls_of(lambda: warnings_of(run)) < 8
     assert calls_of(lambda: run.ledger) < 14
 

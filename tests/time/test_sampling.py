@@ -10,6 +10,7 @@ from small_structures import chain
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.events.packing import level_arrays
+from multiphi_exudyn.time.loop.motion_size import SAMPLES
 from multiphi_exudyn.time.record import record
 from multiphi_exudyn.time.segments import segment
 from multiphi_exudyn.time.simulate import Run
@@ -62,7 +63,7 @@ def test_the_sizes_of_a_motion_are_those_of_its_displacements_and_energies(loads
     """By the compiled flow, by single segments, and by the displacements of the structure in the norm of its mass."""
     run = mp.simulate(model(mp.ModalDamping([0.02, 0.01, 0.03])), 5.0, displacement=START, loads=loads)
     found = segment.as_segments(run.segments).sizes(4.9)
-    times = np.linspace(0.0, 4.9, 25)
+    times = np.linspace(0.0, 4.9, SAMPLES)
     x = run.displacement(times)
     squares = np.sum(x * (run.model.structure.mass @ x), axis=0)
     expected = np.mean(squares[1:] + squares[:-1]) / 2, np.max(np.abs(run.energy(times)))

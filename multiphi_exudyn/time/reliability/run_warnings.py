@@ -9,8 +9,9 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "redundant friction: ..." friction whose share of the load, and begin of slip, is not unique (friction_warnings.py)
     "friction in turn: ..."   friction at rigid contacts that is decided in an order (friction_warnings.py)
     "several impacts: ..."    an impact with friction for which Coulomb's law has several solutions (impact_warnings.py)
-    "lost energy: ..."        energy lost to truncation, of the largest of the run (truncation_warnings.py)
-    "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held
+    "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held, and
+                              the energy lost with it
+    "lost energy: ..."        energy lost to truncation, of the largest of the run, where displacements hold
     "undamped modes: ..."     modes for which a list of modal ratios has none
     "damping ratios: ..."     ratios that look like per cent
     "missing modes: ..."      contacts of a structure of modes alone, where its static flexibility is not known

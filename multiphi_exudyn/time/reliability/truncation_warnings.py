@@ -50,26 +50,28 @@ def verdict_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tu
 def truncation_warnings(
     model: MultiPhiModel, verdict: tuple[float, float], tolerance: Tolerance | None, struck: bool
 ) -> tuple[str, ...]:
-    """Warnings of energy and of motion lost to truncation; struck: whether a rigid contact was struck."""
+    """One warning of motion and energy lost to truncation, or none; struck: whether a rigid contact was struck."""
     share, error = verdict
     if tolerance is not None and error > tolerance.error:
-        return energy_warning(share) + _tolerance_warning(model, error, tolerance)
-    return _sentences(share, error, struck)
+        kept = model.level_at(()).modes
+        return (
+            f"truncation: the indicator is {error:.2g} with {kept} modes, the tolerance {tolerance.error:g}"
+            f"{_also_lost(share)}; give Tolerance a larger most=, or a new model, so that it decides by this run",
+        )
+    return _sentence(share, error, struck)
 
 
 @functools.lru_cache(TEXTS)
-def _sentences(share: float, error: float, struck: bool) -> tuple[str, ...]:
-    """Warnings of a verdict on a run whose modes no tolerance has decided."""
-    return energy_warning(share) + _motion_warning(error, struck)
+def _sentence(share: float, error: float, struck: bool) -> tuple[str, ...]:
+    """One warning of a verdict on a run whose modes no tolerance has decided: of its motion, else of its energy.
 
-
-def _tolerance_warning(model: MultiPhiModel, error: float, tolerance: Tolerance) -> tuple[str, ...]:
-    """Warning of an indicator above the tolerance that decided the modes."""
-    kept = model.level_at(()).modes
-    return (
-        f"truncation: the indicator is {error:.2g} with {kept} modes, the tolerance {tolerance.error:g}; "
-        "give Tolerance a larger most=, or a new model, so that it decides by this run",
-    )
+    The estimated error of motion is on average four times the true one where a rigid contact was struck.
+    """
+    if not error > (RIGID_INDICATOR if struck else INDICATOR):
+        return energy_warning(share)
+    typical = ", with rigid contacts a quarter of that is typical" if struck else ""
+    off = f"truncation: displacements may be off by {per_cent(error)} of the motion"
+    return (f"{off}{typical}{_also_lost(share)}; {REMEDY}",)
 
 
 def energy_warning(share: float) -> tuple[str, ...]:
@@ -79,9 +81,6 @@ def energy_warning(share: float) -> tuple[str, ...]:
     return (f"lost energy: truncation took {per_cent(share)} of the largest energy of the run; {REMEDY}",)
 
 
-def _motion_warning(error: float, struck: bool) -> tuple[str, ...]:
-    """Warning of the estimated error, on average four times the true one where a rigid contact was struck."""
-    if not error > (RIGID_INDICATOR if struck else INDICATOR):
-        return ()
-    typical = ", with rigid contacts a quarter of that is typical" if struck else ""
-    return (f"truncation: displacements may be off by {per_cent(error)} of the motion{typical}; {REMEDY}",)
+def _also_lost(share: float) -> str:
+    """Energy lost, as part of a sentence on the motion."""
+    return f", and {per_cent(share)} of the largest energy of the run was lost" if share > 0 else ""
