@@ -10,7 +10,7 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.mathematics.compiling import compiled
 from multiphi_exudyn.mathematics.complementarity import free_rows, principal_pivoting
 from multiphi_exudyn.mathematics.complementarity.least_distance import Infeasible
-from multiphi_exudyn.mathematics.response import basis_arrays, response_arrays
+from multiphi_exudyn.mathematics.response import basis_arrays, forced_arrays, response_arrays
 from multiphi_exudyn.mathematics.search import signal_bounds, zero_crossing
 
 
@@ -177,7 +177,7 @@ def in_buffers(response, squares, damping, rate, forces, horizon):
     carrier, given = buffers.put_waves([rate]), buffers.put_waves(forces)
     scratch, result = buffers.put_waves(np.zeros(8 * most)), buffers.put_waves(np.zeros(most * r))
     still = buffers.put_numbers(np.zeros(len(squares)))
-    rows = response_arrays.forced_response(
+    rows = forced_arrays.forced_response(
         *buffers.all, record, carrier, given, degree, horizon, still, still, most, scratch, result
     )
     return buffers.waves[result : result + rows * r].reshape(rows, r)

@@ -7,7 +7,7 @@ from carriers import CARRIERS
 from numpy.testing import assert_allclose
 
 from multiphi_exudyn.mathematics.compiling import compiled
-from multiphi_exudyn.mathematics.response import response_arrays
+from multiphi_exudyn.mathematics.response import forced_arrays, response_arrays
 from multiphi_exudyn.mathematics.response.coupled_response import modal_response
 from multiphi_exudyn.mathematics.response.forced_response import particular
 
@@ -69,7 +69,7 @@ def forced(squares, damping, rate, forces, horizon, most=MOST, run=lambda functi
     record = buffers.put_response(modal_response(squares, damping), squares, damping)
     carrier, given = buffers.put_waves([rate]), buffers.put_waves(forces)
     scratch, x = buffers.put_waves(np.full(2 * most, np.nan)), buffers.put_waves(np.full(most * r, np.nan))
-    rows = run(response_arrays.forced_response)(
+    rows = run(forced_arrays.forced_response)(
         *buffers.all, record, carrier, given, count - 1, horizon, eta, eta + r, most, scratch, x
     )
     return rows, buffers.waves[x : x + min(rows, most) * r].reshape(-1, r)

@@ -46,7 +46,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.events.law.changes import NO_REQUEST
 from multiphi_exudyn.events.law.phases import entered_signal
-from multiphi_exudyn.events.states.flow import signal_waves
+from multiphi_exudyn.events.states.signal_flow import signal_waves
 from multiphi_exudyn.events.states.signals import held_part, mapped_size
 from multiphi_exudyn.events.states.state_arrays import accelerate
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled

@@ -45,7 +45,8 @@ from multiphi_exudyn.events.arrays import (
     WORK_WAVES,
     WORKED,
 )
-from multiphi_exudyn.events.states.flow import expand, signal_sizes, signal_waves
+from multiphi_exudyn.events.states.flow import expand
+from multiphi_exudyn.events.states.signal_flow import signal_sizes, signal_waves
 from multiphi_exudyn.events.states.signals import held_part, mapped_size, rate_sign, row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.search.zero_crossing import first_sign

@@ -3,5 +3,5 @@
 For matrices as NumPy has them, and in flat buffers for the loop of a run.
 
 Order: exponentials, basis_arrays, free_response, light_damping, motion_parts, coupled_response, forced_response,
-forced_orders, response_arrays.
+forced_orders, response_arrays, forced_arrays.
 """

@@ -20,7 +20,6 @@ from multiphi_exudyn.events.arrays import (
     CONSTANTS,
     CURRENT,
     DECISIONS,
-    DEFECTS,
     DISSIPATION,
     DRIVE,
     DRIVE_NEXT,
@@ -37,9 +36,6 @@ from multiphi_exudyn.events.arrays import (
     FRESH,
     FULL,
     GIVEN,
-    GIVEN_ENERGY,
-    GIVEN_SPRINGS,
-    GIVEN_UP,
     HIGHEST_FREQUENCY,
     HORIZON,
     INSTANT_TIME,
@@ -48,9 +44,6 @@ from multiphi_exudyn.events.arrays import (
     LAST_DECISION,
     LEFT_ENERGY,
     LEVEL,
-    LOSSES,
-    LOST,
-    LOST_AT_START,
     MODES,
     NEED,
     NEED_PIECES,
@@ -81,7 +74,6 @@ from multiphi_exudyn.events.arrays import (
     TOO_LONG,
     TRANSITIONS,
     TRANSITIONS_NOW,
-    UNAVAILABLE,
     WAITING,
     WHOLE,
     WINDOW,
@@ -90,21 +82,19 @@ from multiphi_exudyn.events.arrays import (
     WORKING,
 )
 from multiphi_exudyn.events.law.bounces import is_rebound_only
-from multiphi_exudyn.events.law.changes import clear
 from multiphi_exudyn.events.law.decision import decide, decide_jump
-from multiphi_exudyn.events.law.first_state import begin
 from multiphi_exudyn.events.law.monitoring import arm, collect_requests, flag_repeated_requests, watch
 from multiphi_exudyn.events.states.channel_values import keep_drive, load_piece, piece_end, set_drive
-from multiphi_exudyn.events.states.defect_sums import add_defect, add_start_defect, lacks_struck_defects
+from multiphi_exudyn.events.states.defect_sums import add_defect, lacks_struck_defects
 from multiphi_exudyn.events.states.energies import energy, kinetic, pattern_work, potential, strain
 from multiphi_exudyn.events.states.flow import expand, state_at
-from multiphi_exudyn.events.states.maps import find_map
 from multiphi_exudyn.events.states.state_arrays import copy_state, measure
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.response.basis_arrays import SCALES
 from multiphi_exudyn.mathematics.search.zero_crossing import INSTANT, NONE, first_descent
 from multiphi_exudyn.time.loop.loop_record import is_chatter, keep_events, keep_segment
 from multiphi_exudyn.time.loop.motion_size import INDICATOR, begin_size_samples, keep_size_samples, sample_motion_size
+from multiphi_exudyn.time.loop.run_start import begin_run, continue_run, fail_if_unavailable
 from multiphi_exudyn.time.loop.verdict import set_verdict
 from multiphi_exudyn.time.loop.work_sums import work_of_segment
 
@@ -170,58 +160,6 @@ def is_finite(ints: Ints, numbers: Numbers) -> int:
 
 
 @compiled
-def begin_run(ints: Ints, numbers: Numbers, waves: Waves) -> int:
-    """Make the first state of the run the current one, with the events of the start; return OK, NEED or FAILED."""
-    status = fail_if_unavailable(ints, begin(ints, numbers, waves))
-    if ints[FORCED_WANTED] > ints[FORCED_ROOM]:
-        ints[NEEDED], status = NEED_ROOM, NEED
-    if status >= 0 and ints[JUDGED] == 1 and find_map(ints, ints[GIVEN + LEVEL], ints[WORKED + LEVEL]) < 0:
-        status = fail_if_unavailable(ints, NEED)
-    if status < 0:
-        return status
-    ints[STARTING] = 0
-    for k in range(LOSSES):  # losses of the start that no event records
-        numbers[LOST_AT_START + k] = numbers[LOST + k] if ints[CHANGE_COUNT] == 0 else 0.0
-    numbers[WORK] = pattern_work(ints, numbers, WORKED) - pattern_work(ints, numbers, GIVEN)
-    numbers[GIVEN_ENERGY] = energy(ints, numbers, GIVEN) + numbers[GIVEN_SPRINGS]
-    copy_state(ints, numbers, WORKED, CURRENT)
-    add_start_defect(ints, numbers)
-    ints[TRANSITIONS] += ints[TRANSITIONS_NOW]
-    keep_events(ints, numbers)
-    return OK
-
-
-@compiled
-def continue_run(ints: Ints, numbers: Numbers, waves: Waves) -> int:
-    """Begin at the final state of another run; return OK, NEED or FAILED.
-
-    Where the loads differ from those before, elements may change their states at once.
-    """
-    numbers[GIVEN_ENERGY] = energy(ints, numbers, CURRENT)
-    copy_state(ints, numbers, CURRENT, REACHED)
-    status = fail_if_unavailable(ints, decide_jump(ints, numbers, waves))
-    if status < 0:
-        return status
-    ints[STARTING] = 0
-    clear(numbers, LOST_AT_START)
-    if status == EVENT:
-        copy_state(ints, numbers, WORKED, CURRENT)
-        numbers[DEFECTS] = math.nan
-        ints[TRANSITIONS] += ints[TRANSITIONS_NOW]
-        keep_events(ints, numbers)
-    return OK
-
-
-@compiled
-def fail_if_unavailable(ints: Ints, status: int) -> int:
-    """Return the status, FAILED where the loop needs (NEED) what cannot be supplied."""
-    if status == NEED and ints[GIVEN_UP] == 1:
-        ints[CAUSE] = UNAVAILABLE
-        return FAILED
-    return status
-
-
-@compiled
 def begin_next_piece(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
     """Begin the next piece of the channels in the present state; return OK, NEED, FULL or FAILED.
 
@@ -284,10 +222,7 @@ def advance_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> i
             horizon, ints[SEARCH_NUMBERS], ints[SEARCH_WAVES], ints[FOUND],
         )  # fmt: skip
         if signal < NONE:
-            ints[CAUSE] = TOO_LONG if signal == SEARCH_TOO_LONG else NOT_FINITE
-            numbers[TOLD] = numbers[ints[ints[FLOW_BASIS] + SCALES] + 1]
-            numbers[TOLD + 1] = numbers[ints[FOUND] + 2]
-            numbers[TOLD + 2] = numbers[ints[FOUND] + 3]
+            tell_failed_search(ints, numbers, signal)
             return FAILED
         if signal == NONE:
             elapsed = horizon
@@ -331,6 +266,15 @@ def advance_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> i
         copy_state(ints, numbers, REACHED, CURRENT)
         return OK
     return apply_decision(ints, numbers, level, status)
+
+
+@compiled
+def tell_failed_search(ints: Ints, numbers: Numbers, answer: int) -> None:
+    """Keep the cause of a search without an answer, and what its message tells (failures.py)."""
+    ints[CAUSE] = TOO_LONG if answer == SEARCH_TOO_LONG else NOT_FINITE
+    numbers[TOLD] = numbers[ints[ints[FLOW_BASIS] + SCALES] + 1]
+    numbers[TOLD + 1] = numbers[ints[FOUND] + 2]
+    numbers[TOLD + 2] = numbers[ints[FOUND] + 3]
 
 
 @compiled

@@ -194,6 +194,34 @@ class Segments(Sequence[Segment], ABC):
         parts = zip(places.tolist(), starts.tolist(), ends.tolist(), strict=True)
         return sum(self[place].integral(row, start, end) for place, start, end in parts)
 
+    def evaluated(
+        self, times: np.ndarray, side: str, values: Callable[[Segment, np.ndarray], np.ndarray]
+    ) -> np.ndarray:
+        """``values`` (..., k) of the segments that own the times (k,) [s], in the order of the times."""
+        owner = self.owners(times, side)
+        result: np.ndarray | None = None
+        for part in np.split(np.argsort(owner, kind="stable"), np.flatnonzero(np.diff(np.sort(owner))) + 1):
+            part_values = values(self[owner[part[0]]], times[part])
+            if result is None:
+                result = np.empty((*part_values.shape[:-1], len(times)))
+            result[..., part] = part_values
+        assert result is not None
+        return result
+
+    def intervals(self, holds: Callable[[LoadedLevel], bool]) -> list[tuple[float, float]]:
+        """Intervals [s] of the levels for which ``holds`` is true, instants left out."""
+        intervals: list[tuple[float, float]] = []
+        places, starts, ends = np.zeros(0, np.int64), self.starts, self.ends
+        if len(self):
+            chosen = np.array([holds(level) for level in self.levels], bool)
+            places = np.flatnonzero(chosen[self.numbers] & (ends > starts))
+        for start, end in zip(starts[places].tolist(), ends[places].tolist(), strict=True):
+            if intervals and intervals[-1][1] == start:
+                intervals[-1] = (intervals[-1][0], end)
+            else:
+                intervals.append((start, end))
+        return intervals
+
     def owners(self, times: np.ndarray, side: str = "right") -> np.ndarray:
         """Indices (k,) of the segments of times (k,) [s]."""
         return owners(self.starts, times, side)

@@ -179,7 +179,7 @@ class Histories(Shown, ABC):
         >>> [round(t, 4) for t in tr.contact_intervals("stop")[0]]
         [0.0197, 0.0229]
         """
-        return self._intervals(self._holds("contact_intervals", contact))
+        return self._segments.intervals(self._holds("contact_intervals", contact))
 
     def friction_force(self, name: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """T [N] of a friction, whose force on the structure is -h T: a float for a scalar t, (k,) for (k,) times."""
@@ -197,7 +197,7 @@ class Histories(Shown, ABC):
 
         Instants are left out: a block without a spring that turns sticks at one and slips on.
         """
-        return np.array(self._intervals(self._holds("stick_intervals", name))).reshape(-1, 2)
+        return np.array(self._segments.intervals(self._holds("stick_intervals", name))).reshape(-1, 2)
 
     def energy(self, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """Kinetic + strain energy [J], closed compliant contacts and force laws included: a float, or (k,)."""
@@ -271,24 +271,10 @@ class Histories(Shown, ABC):
         no_text("points", points)
         return {name: self.at(name, times) for name in (self.points if points is None else points)}
 
-    def _intervals(self, holds: Callable[[Any], bool]) -> list[tuple[float, float]]:
-        """Intervals [s] of the levels for which ``holds`` is true, instants left out."""
-        intervals: list[tuple[float, float]] = []
-        segments = self._segments
-        chosen = np.array([holds(level) for level in segments.levels], bool)
-        places = np.zeros(0, np.int64)
-        if len(segments):
-            places = np.flatnonzero(chosen[segments.numbers] & (segments.ends > segments.starts))
-        for start, end in zip(segments.starts[places].tolist(), segments.ends[places].tolist(), strict=True):
-            if intervals and intervals[-1][1] == start:
-                intervals[-1] = (intervals[-1][0], end)
-            else:
-                intervals.append((start, end))
-        return intervals
-
     def _configurations(self, t: float | np.ndarray, side: str, derivative: int) -> np.ndarray:
         times = self._times(t)
-        places, segments = self._owners(times, side), self._segments
+        segments = self._segments
+        places = segments.owners(times, _side(side))
         states = segments.states(places, times - segments.starts[places])
         numbers, result = segments.numbers[places], np.empty((0, len(times)))
         for number in np.unique(numbers).tolist():
@@ -308,17 +294,8 @@ class Histories(Shown, ABC):
     def _evaluate(
         self, t: float | np.ndarray, side: str, values: Callable[[Segment, np.ndarray], np.ndarray]
     ) -> float | np.ndarray:
-        """``values`` of the segments that own the times, in the order of the times."""
-        times = self._times(t)
-        owner = self._owners(times, side)
-        parts = np.split(np.argsort(owner, kind="stable"), np.flatnonzero(np.diff(np.sort(owner))) + 1)
-        result: np.ndarray | None = None
-        for part in parts:
-            part_values = values(self.segments[owner[part[0]]], times[part])
-            if result is None:
-                result = np.empty((*part_values.shape[:-1], len(times)))
-            result[..., part] = part_values
-        assert result is not None
+        """``values`` (..., k) of the segments that own the times."""
+        result = self._segments.evaluated(self._times(t), _side(side), values)
         if np.ndim(t) == 0:
             return float(result[0]) if result.ndim == 1 else result[:, 0]
         return result
@@ -342,9 +319,6 @@ class Histories(Shown, ABC):
     @functools.cached_property
     def _segments(self) -> Segments:
         return as_segments(self.segments)
-
-    def _owners(self, times: np.ndarray, side: str) -> np.ndarray:
-        return self._segments.owners(times, _side(side))
 
 
 def _side(side: str) -> str:
