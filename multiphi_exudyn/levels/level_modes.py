@@ -9,9 +9,9 @@ w = sqrt|K| Phi^T p, as
 again by singular values; mu = 0 unless the level is indefinite or nearly so.
 
 Where one direction alone is closed, with K > 0, the lowest modes are those of a rank-one change, roots of its secular
-equation (secular_equation.py). Otherwise, for a quarter of the modes or fewer, in a base without
-rigid-body modes and with no K < 0, they are the largest eigenvectors of the level's compliance, which differs
-from that of the base by a matrix of rank d,
+equation (secular_equation.py); a few directions are as many such changes. Otherwise, for a quarter of the modes or
+fewer, in a base without rigid-body modes and with no K < 0, they are the largest eigenvectors of the level's
+compliance, which differs from that of the base by a matrix of rank d,
 
     A = Omega^-2 - Omega^-2 P (1/K + P^T Omega^-2 P)^-1 P^T Omega^-2            (rigid: 1/K = 0)
 
@@ -44,6 +44,7 @@ __all__ = ["level_modes"]
 
 NEARLY_INDEFINITE = 0.5  # share of a stiffness that negative springs may take before mu is needed
 FEW = 4  # modes of the base for each requested mode, from which the compliance matrix is cheaper
+CHANGES = 130_000  # coordinates of all modes between rank-one changes, up to which these are cheaper
 SECULAR = 50  # modes of a base from which roots of the secular equation are cheaper than all singular values
 LARGE = 150  # modes of a base, from which Lanczos iterations of the compliance matrix are cheaper
 ORTHOGONAL = 1e-12  # product of two modes, above which they are recomputed in the space that they span
@@ -78,7 +79,7 @@ def _cheapest(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Return ``level_modes`` by the cheapest method."""
     if modes is not None and base.modes.count >= SECULAR:
-        solution = _rank_one_change(base, closed_directions, modes)
+        solution = _rank_one_changes(base, closed_directions, modes)
         if solution is not None:
             return solution
     if modes is not None and _is_compliance_cheaper(base, closed_directions, modes):
@@ -100,22 +101,32 @@ def _identity(count: int) -> np.ndarray:
     return np.eye(count)
 
 
-def _rank_one_change(
+def _rank_one_changes(
     base: ModalBase, closed_directions: ClosedDirections, modes: int
 ) -> tuple[np.ndarray, np.ndarray, float] | None:
-    """``_singular_value_modes``, the lowest only, of a single spring or rigid direction, else None."""
-    sprung = [(j, k) for j, k in enumerate(closed_directions.stiffness.tolist()) if k]
-    if len(sprung) != 1 or sprung[0][1] < 0:
+    """``_singular_value_modes``, the lowest only, of a few springs and rigid directions, else None.
+
+    Each direction changes the modes that those before it have left, all of which are needed until the last one.
+    """
+    stiffness = closed_directions.stiffness
+    sprung = np.flatnonzero(stiffness)
+    if not len(sprung) or stiffness.min() < 0 or (len(sprung) - 1) * base.modes.count**2 > CHANGES:
         return None
-    j, stiffness = sprung[0]
-    direction = closed_directions.vectors[:, j]
-    lowest = rank_one_modes(base.squares, direction, stiffness, modes)
-    if lowest is None:
-        return None
-    squares, vectors = lowest
-    if math.isinf(stiffness):
-        vectors = without(direction[:, None], vectors)
-    return squares, vectors, 0.0
+    squares, changes = base.squares, list[np.ndarray]()
+    for place, j in enumerate(sprung.tolist()):
+        direction = closed_directions.vectors[:, j]
+        for change in changes:
+            direction = direction @ change
+        rigid = math.isinf(stiffness[j])
+        count = modes if place == len(sprung) - 1 else len(squares) - rigid
+        solution = rank_one_modes(squares, direction, float(stiffness[j]), count)
+        if solution is None:
+            return None
+        squares = solution[0]
+        changes.append(solution[1])
+    vectors = functools.reduce(lambda later, change: change @ later, reversed(changes))
+    pinned = closed_directions.vectors[:, closed_directions.rigid]
+    return squares, without(pinned, vectors) if pinned.shape[1] else vectors, 0.0
 
 
 def _singular_value_modes(

@@ -119,7 +119,25 @@ def test_a_root_takes_eight_steps_at_most_and_is_the_plain_one(monkeypatch, k):
     assert rank_one_modes(d, p, k, COUNT) is None
 
 
-def test_more_than_there_are_between_the_poles_are_left_to_others():
-    assert rank_one_modes(np.arange(1.0, 6), np.ones(5), 1.0, 5) is None
+@given(st.integers(0, 2**31), st.sampled_from(STIFFNESSES), st.integers(0, 3))
+def test_all_of_them_are_those_of_the_whole_matrix(seed, k, absent):
+    """The highest of a spring is above all d; of a rigid direction there is one less."""
+    random = np.random.default_rng(seed)
+    d, p = np.sort(random.uniform(1, 100, 20)), random.normal(size=20)
+    p[random.choice(20, absent, replace=False)] = 0.0
+    count = 19 if math.isinf(k) else 20
+    found = rank_one_modes(d, p, k, count)
+    check(d, p, k, found)
+    values, _ = whole(d, p, k, count)
+    assert_allclose(found[0], values, rtol=1e-11, atol=0 if k < 1e6 or math.isinf(k) else 1e-15 * k * (p @ p) * 20)
+
+
+def test_one_spring_on_one_mode_adds_to_its_square():
+    values, vectors = rank_one_modes(np.arange(1.0, 6), 2.0 * np.eye(5)[1], 10.0, 5)
+    assert_allclose(values, [1.0, 3.0, 4.0, 5.0, 42.0], rtol=1e-15)
+    assert_allclose(np.abs(vectors[:, -1]), np.eye(5)[1])
+
+
+def test_more_than_there_are_or_of_no_direction_are_left_to_others():
     assert rank_one_modes(np.arange(1.0, 6), np.ones(5), math.inf, 5) is None
     assert rank_one_modes(np.arange(1.0, 6), np.zeros(5), 1.0, 3) is None

@@ -2,7 +2,8 @@
 
     diag(d) + k p p^T:   1/k + sum_i p_i^2 / (d_i - x) = 0   (rigid: 1/k = 0),   v_i = p_i / (d_i - x)
 
-There is one root between two neighbours d_l < d_u. It is found as a distance from the nearer of them, by zeros of
+There is one root between two neighbours d_l < d_u, and of a spring one above the highest d. It is found as a distance
+from the nearer of them, by zeros of
 
     c + a / (d_l - x) + b / (d_u - x)
 
@@ -40,7 +41,7 @@ DEFLATED = -1
 
 
 def rank_one_modes(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the ``count`` lowest eigenvalues, ascending, and vectors (m, count); None for fewer roots between the d.
+    """Return the ``count`` lowest eigenvalues, ascending, and vectors (m, count); None where there are fewer.
 
     d: (m,), ascending, none negative. stiffness: k > 0, inf for the constraint p.v = 0.
     """
@@ -57,22 +58,32 @@ def rank_one_modes(d: np.ndarray, p: np.ndarray, stiffness: float, count: int) -
     sizes = components * components / (d + d[min(count, len(d) - 1)])
     present = (sizes > ABSENT**2 * sizes.sum()) & (np.abs(components) > NOISE * math.sqrt(p @ p))
     poles, deflated = np.flatnonzero(present), np.flatnonzero(~present)[:count]
-    roots = min(count, len(poles) - 1)
-    if roots < 1 or (roots < count and np.isfinite(stiffness)) or roots + len(deflated) < count:
+    given, weights = d[poles], components[poles]
+    if 0 < len(poles) <= count and math.isfinite(stiffness):
+        given, weights = _with_bound(given, weights, stiffness)
+    roots = min(count, len(given) - 1)
+    if roots < 1 or roots + len(deflated) < count:
         return None
-    numbers = _memory(d[poles], components[poles], roots)
-    if not find_roots(numbers, len(poles), roots, 1 / stiffness, 0):
+    numbers = _memory(given, weights, roots)
+    if not find_roots(numbers, len(given), roots, 1 / stiffness, 0):
         return None
-    solution = _solution(numbers, len(poles), roots)
+    solution = _solution(numbers, len(given), roots)
     values = np.concatenate([solution[0], d[deflated]])
     order = np.argsort(values, kind="stable")[:count]
     vectors = np.zeros((len(d), len(values)))
-    vectors[poles, :roots] = solution[1]
+    vectors[poles, :roots] = solution[1][: len(poles)]
     vectors[deflated, np.arange(roots, len(values))] = 1.0
     vectors = vectors[:, order]
     for first, last, rotation in rotations:
         vectors[first:last] = rotation @ vectors[first:last]
     return values[order], vectors
+
+
+def _with_bound(d: np.ndarray, p: np.ndarray, stiffness: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return d and p with one more d, without a part in p, above the highest root, which is at most d_m + k |p|^2."""
+    highest = float(d[-1])
+    bound = highest + 2 * stiffness * float(p @ p)
+    return (np.append(d, bound), np.append(p, 0.0)) if bound > highest * (1 + EQUAL) else (d, p)
 
 
 def _cluster_rotations(d: np.ndarray, p: np.ndarray) -> list[tuple[int, int, np.ndarray]]:
