@@ -8,11 +8,11 @@ from multiphi_exudyn.errors import (
     NumericalFailure,
 )
 from multiphi_exudyn.events.transitions.state import Event
-from multiphi_exudyn.levels.level import Level
-from multiphi_exudyn.levels.level_override import LevelOverride
-from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo
-from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.levels.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.level.level import Level
+from multiphi_exudyn.levels.level.level_override import LevelOverride
+from multiphi_exudyn.levels.model.mode_choice import Tolerance, UpTo
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.beams.beam import Beam, Clamp, PointMass
 from multiphi_exudyn.mechanics.beams.planar_beam import planar_beam
 from multiphi_exudyn.mechanics.beams.section import Section

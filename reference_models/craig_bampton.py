@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.levels.level import Level
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.level.level import Level
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 from multiphi_exudyn.mechanics.structures.structure import LinearStructure
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.elements.friction import Friction
 from multiphi_exudyn.mechanics.loads.loads import HarmonicLoad
 from multiphi_exudyn.mechanics.loads.moving_supports import StopMotion

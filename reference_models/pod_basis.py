@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.structures.structure import LinearStructure
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from reference_models.projection import projected

@@ -19,7 +19,7 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import Phase, State
 from multiphi_exudyn.events.transitions.transition import Transition
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 
 __all__ = ["Signal", "SpringRule"]
 

@@ -14,13 +14,13 @@ from multiphi_exudyn.exudyn_plugin.body.create import CreateMultiPhiBody
 from multiphi_exudyn.exudyn_plugin.body.results.drawing import Drawing
 from multiphi_exudyn.exudyn_plugin.body.results.sensors import BodyHistories, body_histories
 from multiphi_exudyn.exudyn_plugin.body.solver.solving import install_checks
-from multiphi_exudyn.exudyn_plugin.convert.fem_interface import linear_structure_from_fem
-from multiphi_exudyn.exudyn_plugin.convert.items import Item
-from multiphi_exudyn.exudyn_plugin.convert.linearize import linear_structure_from
-from multiphi_exudyn.exudyn_plugin.convert.linearized_structure import LinearizedStructure
-from multiphi_exudyn.exudyn_plugin.convert.range_check import RangeCheck
+from multiphi_exudyn.exudyn_plugin.convert.items.items import Item
+from multiphi_exudyn.exudyn_plugin.convert.linear_range.range_check import RangeCheck
 from multiphi_exudyn.exudyn_plugin.convert.reduce import reduce
 from multiphi_exudyn.exudyn_plugin.convert.reduction import Reduction
+from multiphi_exudyn.exudyn_plugin.convert.structure.fem_interface import linear_structure_from_fem
+from multiphi_exudyn.exudyn_plugin.convert.structure.linearize import linear_structure_from
+from multiphi_exudyn.exudyn_plugin.convert.structure.linearized_structure import LinearizedStructure
 from multiphi_exudyn.exudyn_plugin.coupling.interface_nodes import PositionInterface, RigidInterface
 
 __all__ = [

@@ -4,15 +4,13 @@ The modal base makes every level a small dense problem. A level has modes and an
 response to gaps and loads. The model builds levels as they are needed, chooses their number of modes, and finds static
 equilibria. Where the equations are stated:
 
-    (38.2)  x = Phi_l eta, mass-normalised modes          level_modes.level_modes; level.Level.shapes
-    (38.3)  the modal equations of motion                 build_level.build_level: squares, damping
-    (38.4)  x = Phi_l eta + x_inf,l                       level.Level.asymptotic
-    (38.5)  x_inf,l of gaps and loads                     static_response.static_response
+    (38.2)  x = Phi_l eta, mass-normalised modes          level/level_modes.level_modes; level/level.Level.shapes
+    (38.3)  the modal equations of motion                 level/build_level.build_level: squares, damping
+    (38.4)  x = Phi_l eta + x_inf,l                       level/level.Level.asymptotic
+    (38.5)  x_inf,l of gaps and loads                     level/static_response.static_response
 
 Their solution in time is mathematics/response/free_response.py, of loads that vary
 mathematics/response/forced_response.py.
 
-Order: closed_directions, modal_base, build_base, static_response, level_modes, mode_figure, level_override, level,
-build_level, sliding, sliding_equilibrium, static_equilibrium, equilibrium_under_forces, mode_choice, level_store,
-shared_base, model_arguments, model.
+Order: base, level, equilibrium, model.
 """

@@ -14,8 +14,8 @@ import numpy as np
 
 from multiphi_exudyn.display import Shown
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.levels.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.loads.static_loads import StaticLoad
 from multiphi_exudyn.mechanics.structures.structure import At
 from multiphi_exudyn.steady.settled_state import PeriodicLoad, SteadyState

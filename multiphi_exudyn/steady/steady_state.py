@@ -20,9 +20,9 @@ from dataclasses import replace
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.levels.mode_choice import Tolerance
-from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.levels.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.model.mode_choice import Tolerance
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.loads.loads import HarmonicLoad
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity, StaticLoad
 from multiphi_exudyn.mechanics.structures.arguments import is_real

@@ -17,9 +17,9 @@ from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiVal
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.packing.start_arrays import Start
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.levels.mode_choice import Tolerance
-from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.levels.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.model.mode_choice import Tolerance
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.compiling.compiled import available
 from multiphi_exudyn.mechanics.loads.loads import Load, patterns, unchanging
 from multiphi_exudyn.mechanics.structures.arguments import is_real

@@ -7,7 +7,7 @@ import pytest
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories, reduce
-from multiphi_exudyn.exudyn_plugin.convert import linearize
+from multiphi_exudyn.exudyn_plugin.convert.structure import linearize
 from reference_models.published_systems import OwnRun, PublishedSystem
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")

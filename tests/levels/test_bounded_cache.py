@@ -11,7 +11,7 @@ from small_structures import bed, chain, stop
 
 from multiphi_exudyn import ConstantLoad, HarmonicLoad, MultiPhiModel, simulate
 from multiphi_exudyn.events.packing import level_arrays
-from multiphi_exudyn.levels import level_store
+from multiphi_exudyn.levels.model import level_store
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.time.run import motion
 

@@ -6,7 +6,7 @@ import weakref
 import numpy as np
 import pytest
 
-from multiphi_exudyn.levels.closed_directions import ClosedDirections
+from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 
 
 @pytest.mark.parametrize("stiffness", [[1e6], [np.inf], [1e6, np.inf], [np.inf, np.inf]])

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from small_structures import bed
 
 from multiphi_exudyn import LinearStructure, MultiPhiModel, UnilateralContact, simulate
-from multiphi_exudyn.levels.build_level import build_level
+from multiphi_exudyn.levels.level.build_level import build_level
 from multiphi_exudyn.mathematics.eigenproblems.modes import right_singular_vectors
 from multiphi_exudyn.mechanics.beams.beam import Beam
 from multiphi_exudyn.mechanics.beams.planar_beam import planar_beam
@@ -50,7 +50,7 @@ class TestFewModesOfALevel:
             columns.append(matrix.shape[1])
             return right_singular_vectors(matrix)
 
-        monkeypatch.setattr("multiphi_exudyn.levels.level_modes.right_singular_vectors", counted)
+        monkeypatch.setattr("multiphi_exudyn.levels.level.level_modes.right_singular_vectors", counted)
         for modes in (12, 48):
             assert build_level(base, tuple(range(10, 10 + closed)), modes).modes == modes
         assert columns == [12, 48]
@@ -62,7 +62,7 @@ class TestFewModesOfALevel:
         base = bed(stiffness, n=80 if twins else 160, twins=twins).base
         full = build_level(base, closed)
         for needless in ("right_singular_vectors", "_dense_eigenvectors", "_lanczos_eigenvectors"):
-            monkeypatch.setattr(f"multiphi_exudyn.levels.level_modes.{needless}", None)
+            monkeypatch.setattr(f"multiphi_exudyn.levels.level.level_modes.{needless}", None)
         few = build_level(base, closed, 12)
         assert_allclose(few.omega, full.omega[:12], rtol=FREQUENCIES)
         wanted = full.vectors[:, :12]
@@ -88,7 +88,9 @@ class TestFewModesOfALevel:
     @pytest.mark.parametrize("stiffness", [10.0, 1e6, math.inf])
     def test_are_iterated_in_a_large_base(self, monkeypatch, stiffness):
         base, made = bed(stiffness).base, []
-        monkeypatch.setattr("multiphi_exudyn.levels.level_modes._dense_eigenvectors", lambda *given: made.append(given))
+        monkeypatch.setattr(
+            "multiphi_exudyn.levels.level.level_modes._dense_eigenvectors", lambda *given: made.append(given)
+        )
         for indices in SETS:
             assert build_level(base, indices, 12).modes == 12
         assert not made

@@ -9,7 +9,7 @@ import scipy.sparse
 from small_structures import chain, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.levels import level_store
+from multiphi_exudyn.levels.model import level_store
 from reference_models.rig import rig_beam, rig_contact, rig_damping
 
 

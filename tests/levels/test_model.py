@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from small_structures import chain, random_model, stop
 
-import multiphi_exudyn.levels.level_store
+import multiphi_exudyn.levels.model.level_store
 from multiphi_exudyn import ConstantLoad, LevelOverride, LinearStructure, MultiPhiModel, UnilateralContact, simulate
 
 
@@ -59,8 +59,8 @@ class TestMultiPhiModel:
         def never(*_):
             raise AssertionError("built anew")
 
-        monkeypatch.setattr(multiphi_exudyn.levels.level_store, "build_base", never)
-        monkeypatch.setattr(multiphi_exudyn.levels.level_store, "build_level", never)
+        monkeypatch.setattr(multiphi_exudyn.levels.model.level_store, "build_base", never)
+        monkeypatch.setattr(multiphi_exudyn.levels.model.level_store, "build_level", never)
         other = dataclasses.replace(m, modes=modes)
         assert other.level(("stop",)).modes == (5 if modes == "all" else modes)
 

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from multiphi_exudyn import ConstantLoad, LinearStructure, MultiPhiModel, UnilateralContact, simulate
-from multiphi_exudyn.levels.build_level import build_level
+from multiphi_exudyn.levels.level.build_level import build_level
 from multiphi_exudyn.study.stability.run_laws import complaints
 
 PASSED = 1e-9  # of the largest displacement
@@ -88,7 +88,8 @@ def test_a_failure_of_linear_algebra_ends_a_run_with_its_cause(monkeypatch):
     structure = LinearStructure(np.eye(2), np.eye(2))
     model = MultiPhiModel(structure, [UnilateralContact("c", [1.0, 0.0], 0.1)], modes="all")
     monkeypatch.setattr(
-        "multiphi_exudyn.levels.level_store.build_level", lambda *given: (singular if given[1] else build_level)(*given)
+        "multiphi_exudyn.levels.model.level_store.build_level",
+        lambda *given: (singular if given[1] else build_level)(*given),
     )
     run = simulate(model, 5.0, loads=[ConstantLoad([1.0, 0.0], -1.0)])
     assert run.status == "failed"

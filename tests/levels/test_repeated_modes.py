@@ -11,7 +11,8 @@ from numpy.testing import assert_allclose
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.levels import build_base, level_modes
+from multiphi_exudyn.levels.base import build_base
+from multiphi_exudyn.levels.level import level_modes
 from multiphi_exudyn.mathematics.eigenproblems import lowest_modes, modes
 from multiphi_exudyn.mechanics.structures.structure import damping_matrix
 

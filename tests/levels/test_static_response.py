@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.levels.static_response import single_direction_response, static_response
+from multiphi_exudyn.levels.level.static_response import single_direction_response, static_response
 from multiphi_exudyn.mathematics.compiling.compiled import entry
 
 

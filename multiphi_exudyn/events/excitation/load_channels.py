@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
 from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
 from multiphi_exudyn.mechanics.loads.loads import Load, VaryingLoad

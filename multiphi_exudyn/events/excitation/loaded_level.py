@@ -18,8 +18,8 @@ import numpy as np
 from multiphi_exudyn.display import Shown
 from multiphi_exudyn.events.excitation.channels import Channels
 from multiphi_exudyn.events.excitation.excitation import Excitation
-from multiphi_exudyn.levels.level import Asymptotic, Level
-from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.levels.base.modal_base import ModalBase
+from multiphi_exudyn.levels.level.level import Asymptotic, Level
 from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING
 from multiphi_exudyn.mathematics.response.free_response import ModalResponse
 from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off

@@ -152,7 +152,7 @@ def solve_resting_forces(ints: Ints, numbers: Numbers, rest: int) -> int:
 def sliding_level(ints: Ints, rest: int) -> int:
     """10. Return NEED if the level with sliding contacts, whose forces are indeterminate, is missing; else FAILED.
 
-    If its motion is indeterminate too, it is refused when it is built (levels/sliding.py).
+    If its motion is indeterminate too, it is refused when it is built (levels/level/sliding.py).
     """
     for i in range(ints[ELEMENTS]):
         ints[ints[KEY] + i] = ints[ints[COMPLIANT_KEY] + i]

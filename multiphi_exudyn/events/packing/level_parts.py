@@ -10,7 +10,7 @@ import numpy as np
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.levels.base.modal_base import ModalBase
 
 __all__ = ["base_parts", "from_base", "level_parts", "powers"]
 

@@ -17,7 +17,7 @@ from multiphi_exudyn.events.transitions.exit_table import ExitTable
 from multiphi_exudyn.events.transitions.exits import asked_state, signal_row, signals_of
 from multiphi_exudyn.events.transitions.state import Row
 from multiphi_exudyn.events.transitions.work_forms import DrivenForms, driven_forms, primitive, swings
-from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import entry
 from multiphi_exudyn.mathematics.response import response_arrays
 from multiphi_exudyn.mathematics.response.basis_arrays import describe_basis

@@ -23,7 +23,7 @@ from scipy.linalg.lapack import dgeqrf
 
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.transition import Transition
-from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.eigenproblems.orthonormal import without
 
 __all__ = ["DefectForm", "allowed", "defect_form", "factor", "held_rigidly", "over_omega"]

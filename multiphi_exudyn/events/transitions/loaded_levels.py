@@ -16,7 +16,7 @@ from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import State
 from multiphi_exudyn.events.transitions.transition import Transition
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.search.signal_bounds import power_of_two_above
 

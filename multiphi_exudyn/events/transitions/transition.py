@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 from multiphi_exudyn.mathematics.round_off import PRODUCT
 

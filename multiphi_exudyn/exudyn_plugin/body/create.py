@@ -19,9 +19,9 @@ from multiphi_exudyn.exudyn_plugin.body.solver.switching import bodies_of
 from multiphi_exudyn.exudyn_plugin.body.state.coordinates import matrices
 from multiphi_exudyn.exudyn_plugin.coupling.interface import Interface
 from multiphi_exudyn.exudyn_plugin.coupling.interface_nodes import InterfaceNode, InterfacePoint, interface_nodes
-from multiphi_exudyn.levels.mode_choice import Tolerance
-from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.levels.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.model.mode_choice import Tolerance
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 from multiphi_exudyn.mechanics.loads.loads import Load
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity

@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.exudyn_plugin.convert.contacts import contact_distance, contacts_of, spheres_of
-from multiphi_exudyn.exudyn_plugin.convert.frictions import frictions_of
-from multiphi_exudyn.exudyn_plugin.convert.full_system import initial_is_current, items_of, without_contacts
-from multiphi_exudyn.exudyn_plugin.convert.item_fates import (
+from multiphi_exudyn.exudyn_plugin.convert.contacts.contacts import contact_distance, contacts_of, spheres_of
+from multiphi_exudyn.exudyn_plugin.convert.contacts.frictions import frictions_of
+from multiphi_exudyn.exudyn_plugin.convert.contacts.point_rows import default_points, requested_points
+from multiphi_exudyn.exudyn_plugin.convert.items.item_fates import (
     grouped,
     left_out_directions,
     left_out_functions,
@@ -34,16 +34,25 @@ from multiphi_exudyn.exudyn_plugin.convert.item_fates import (
     missing_parts,
     taken_objects,
 )
-from multiphi_exudyn.exudyn_plugin.convert.items import Item, has_contact, user_function
-from multiphi_exudyn.exudyn_plugin.convert.linear_range import LinearRange
-from multiphi_exudyn.exudyn_plugin.convert.linearize import check_system
-from multiphi_exudyn.exudyn_plugin.convert.linearized_structure import LinearizedStructure
-from multiphi_exudyn.exudyn_plugin.convert.point_rows import default_points, requested_points
+from multiphi_exudyn.exudyn_plugin.convert.items.items import Item, has_contact, user_function
+from multiphi_exudyn.exudyn_plugin.convert.linear_range.linear_range import LinearRange
+from multiphi_exudyn.exudyn_plugin.convert.linearisation.full_system import (
+    initial_is_current,
+    items_of,
+    without_contacts,
+)
+from multiphi_exudyn.exudyn_plugin.convert.linearisation.timed_loads import (
+    TimedLoad,
+    function_loads,
+    timed_forces,
+    timed_loads,
+)
 from multiphi_exudyn.exudyn_plugin.convert.reduction import Reduction
-from multiphi_exudyn.exudyn_plugin.convert.system_matrices import linearised
-from multiphi_exudyn.exudyn_plugin.convert.timed_loads import TimedLoad, function_loads, timed_forces, timed_loads
-from multiphi_exudyn.levels.mode_choice import Tolerance, UpTo
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.exudyn_plugin.convert.structure.linearize import check_system
+from multiphi_exudyn.exudyn_plugin.convert.structure.linearized_structure import LinearizedStructure
+from multiphi_exudyn.exudyn_plugin.convert.structure.system_matrices import linearised
+from multiphi_exudyn.levels.model.mode_choice import Tolerance, UpTo
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 from multiphi_exudyn.mechanics.elements.friction import Friction
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.display import Shown, names, per_cent
-from multiphi_exudyn.exudyn_plugin.convert.item_fates import grouped
-from multiphi_exudyn.exudyn_plugin.convert.items import Item
-from multiphi_exudyn.exudyn_plugin.convert.linear_range import LinearLimits, LinearRange
-from multiphi_exudyn.exudyn_plugin.convert.linearized_structure import LinearizedStructure
-from multiphi_exudyn.exudyn_plugin.convert.range_check import RangeCheck
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.exudyn_plugin.convert.items.item_fates import grouped
+from multiphi_exudyn.exudyn_plugin.convert.items.items import Item
+from multiphi_exudyn.exudyn_plugin.convert.linear_range.linear_range import LinearLimits, LinearRange
+from multiphi_exudyn.exudyn_plugin.convert.linear_range.range_check import RangeCheck
+from multiphi_exudyn.exudyn_plugin.convert.structure.linearized_structure import LinearizedStructure
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.loads.loads import Load
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 

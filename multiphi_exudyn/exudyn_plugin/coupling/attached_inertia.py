@@ -24,7 +24,7 @@ import numpy as np
 
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.law.impact import IMMOVABLE
-from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.levels.base.modal_base import ModalBase
 
 __all__ = ["AttachedInertia", "PointInertia", "Reactions"]
 

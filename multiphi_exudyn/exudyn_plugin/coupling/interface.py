@@ -34,8 +34,8 @@ from exudyn.itemInterface import MarkerNodeCoordinates, ObjectConnectorCoordinat
 from multiphi_exudyn.exudyn_plugin.coupling.interface_nodes import TURN, InterfaceNode
 from multiphi_exudyn.exudyn_plugin.coupling.modal_force import static_shift
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.levels.level import Level
-from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.levels.base.modal_base import ModalBase
+from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 

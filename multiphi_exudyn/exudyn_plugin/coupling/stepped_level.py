@@ -3,7 +3,7 @@
     M q'' + D q' + K q = p + drive,   q = eta, padded to the body's size with coordinates that stay zero
 
 Plain: M = I, D = Phi^T C Phi, K = diag(omega^2), q' = eta'. A growing mode has omega^2 < 0 in both forms. Friction of
-sliding contacts adds to D and K, which are then not symmetric (levels/sliding.py).
+sliding contacts adds to D and K, which are then not symmetric (levels/level/sliding.py).
 
 Matched to the step h: the trapezoidal rule replaces exp(h s) by (1 + h s/2) / (1 - h s/2). So it is exact for
 z = (eta, eta') if it integrates, instead of z' = A z + B p, the equation z' = A_h z + B_h p with

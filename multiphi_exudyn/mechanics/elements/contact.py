@@ -26,7 +26,7 @@ In an impact, a rigid contact has the impulse p along h, and q along -h_t, for a
 mu_s is not used in impacts. With e = 0 an impact dissipates energy. With e > 0 and friction, g'+ >= -e g'- might
 generate energy (T. R. Kane). Then e is Poisson's: an impact with e = 0 and impulses p, followed by one with impulses of
 at least e p and g'+ >= 0, again with friction; with the same e for all contacts it dissipates energy, too. A level in
-which sliding has no unique motion is refused with its number (levels/sliding.py).
+which sliding has no unique motion is refused with its number (levels/level/sliding.py).
 
     normal            friction without a spring    with a spring k_t                     restitution and friction
     compliant         possible                     possible                              refused, as without friction

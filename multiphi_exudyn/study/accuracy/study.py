@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.study.accuracy.analysis import most_accurate
 from multiphi_exudyn.study.accuracy.budget import budget
 from multiphi_exudyn.study.accuracy.cases import CASE, Parameters, Study

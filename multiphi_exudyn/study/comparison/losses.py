@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import interval_array
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart

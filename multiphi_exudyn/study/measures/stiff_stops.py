@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.workbench import Setup, start_configuration

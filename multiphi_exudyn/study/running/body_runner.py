@@ -9,8 +9,8 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from multiphi_exudyn.exudyn_plugin import BodyHistories
-from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.levels.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.study.running.runner import Runner
 from multiphi_exudyn.study.running.runs import interval_array, path_length
 from reference_models.body_alone import solve_body_alone

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.study.running.runner import Runner
 from multiphi_exudyn.study.running.runs import interval_array
 from multiphi_exudyn.study.scene.workbench import start_configuration

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.levels.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.structures.structure import LinearStructure
 from multiphi_exudyn.study.running.runner import ENERGY_INTERVAL, Runner, modes_text
 from multiphi_exudyn.study.running.runs import interval_array

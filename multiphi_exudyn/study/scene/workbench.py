@@ -14,10 +14,10 @@ import numpy as np
 import scipy.optimize
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.levels.level_override import LevelOverride
-from multiphi_exudyn.levels.mode_choice import Tolerance
-from multiphi_exudyn.levels.model import MultiPhiModel
-from multiphi_exudyn.levels.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
+from multiphi_exudyn.levels.level.level_override import LevelOverride
+from multiphi_exudyn.levels.model.mode_choice import Tolerance
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.beams.planar_beam import beam_nodes
 from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 from multiphi_exudyn.mechanics.elements.force_law import ForceLaw

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 
 __all__ = ["limits"]
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.events.excitation.excitation import Excitation
-from multiphi_exudyn.levels.mode_choice import is_count
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.mode_choice import is_count
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.compiling.compiled import available
 from multiphi_exudyn.mechanics.loads.loads import Load
 from multiphi_exudyn.mechanics.structures.arguments import no_text, real_array

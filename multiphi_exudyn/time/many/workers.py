@@ -16,8 +16,8 @@ from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.packing.level_arrays import LevelArrays
 from multiphi_exudyn.events.packing.start_arrays import Start
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.levels.mode_choice import Tolerance
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.mode_choice import Tolerance
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.time.many.batch import Batch
 from multiphi_exudyn.time.reliability.run_warnings import ModelWarnings

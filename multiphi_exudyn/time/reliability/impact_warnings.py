@@ -14,7 +14,7 @@ import numpy as np
 
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import event_table
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.complementarity.coulomb_impacts import CoulombImpact
 from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory

@@ -35,9 +35,9 @@ from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import event_table
-from multiphi_exudyn.levels.level import Level
-from multiphi_exudyn.levels.mode_choice import Tolerance
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.level.level import Level
+from multiphi_exudyn.levels.model.mode_choice import Tolerance
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.time.loop.verdict import lost_share
 from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
 from multiphi_exudyn.time.reliability.impact_warnings import impact_warnings

@@ -17,9 +17,9 @@ from dataclasses import replace
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError
-from multiphi_exudyn.levels.level import Level
-from multiphi_exudyn.levels.mode_choice import TRIED, Tolerance, UpTo
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.level.level import Level
+from multiphi_exudyn.levels.model.mode_choice import TRIED, Tolerance, UpTo
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.time.reliability.defects import DefectHistory
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 

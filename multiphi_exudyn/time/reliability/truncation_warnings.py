@@ -8,8 +8,8 @@ import numpy as np
 
 from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.levels.mode_choice import Tolerance
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.mode_choice import Tolerance
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.time.loop.motion_size import INDICATOR, SAMPLES
 from multiphi_exudyn.time.loop.verdict import set_verdict
 from multiphi_exudyn.time.reliability.defects import total_defect

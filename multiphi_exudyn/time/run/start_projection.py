@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from multiphi_exudyn.levels.modal_base import ModalBase
+from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 from multiphi_exudyn.mathematics.round_off import clear_products
 

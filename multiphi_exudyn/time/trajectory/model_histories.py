@@ -9,7 +9,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 from multiphi_exudyn.mechanics.elements.friction import Friction
 from multiphi_exudyn.mechanics.structures.structure import At

@@ -22,7 +22,7 @@ from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.events.packing.start_arrays import Start
 from multiphi_exudyn.events.transitions.exits import exits_of
 from multiphi_exudyn.events.transitions.state import Event, Loss, Phase, State, event_table
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.structures.arguments import is_real
 from multiphi_exudyn.time.segments.segment import Segments
 from multiphi_exudyn.time.trajectory.final_state import FinalState

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 
 __all__ = ["base_warnings", "row_warnings"]
 

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from multiphi_exudyn.display import per_cent
-from multiphi_exudyn.levels.level import Level
-from multiphi_exudyn.levels.mode_choice import CONTACT_SHARE
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.level.level import Level
+from multiphi_exudyn.levels.model.mode_choice import CONTACT_SHARE
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.structures.damping import ModalDamping
 from multiphi_exudyn.mechanics.structures.modal_structure import ModalStructure
 

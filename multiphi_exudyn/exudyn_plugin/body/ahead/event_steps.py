@@ -23,7 +23,7 @@ from multiphi_exudyn.exudyn_plugin.body.ahead.undisturbed_steps import Undisturb
 from multiphi_exudyn.exudyn_plugin.body.state.coordinates import Coordinates
 from multiphi_exudyn.exudyn_plugin.body.stepping.own_loads import OwnLoads
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 
 __all__ = ["EventSteps", "IsolatedBody", "PlanStart", "StepsOf", "amplitudes", "plan_event_steps"]
 

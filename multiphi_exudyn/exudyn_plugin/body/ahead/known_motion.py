@@ -16,7 +16,7 @@ import numpy as np
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.transitions.state import Event, Phase, State
-from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.time.record.recorded_segments import Recorded
 from multiphi_exudyn.time.run.motion import Motion
 from multiphi_exudyn.time.segments.segment import Segments

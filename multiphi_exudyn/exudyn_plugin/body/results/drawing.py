@@ -24,7 +24,7 @@ from exudyn import graphics
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.body.results.reconstruction import reconstruct
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.beams.beam import Beam
 from multiphi_exudyn.mechanics.beams.planar_beam import beam_deflections
 from multiphi_exudyn.mechanics.structures.arguments import is_real, real_array

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from multiphi_exudyn.events.transitions.state import Phase, State
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 
 __all__ = ["LevelData"]
 

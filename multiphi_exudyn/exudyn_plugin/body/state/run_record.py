@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from multiphi_exudyn.events.transitions.state import Loss, State
-from multiphi_exudyn.levels.level import Level
+from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.time.reliability.run_warnings import RunSummary
 
 __all__ = ["RunRecord"]

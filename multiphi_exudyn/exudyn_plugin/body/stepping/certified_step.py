@@ -7,8 +7,8 @@ most h^4/384 max|s''''|, and it is not less than the smallest of its Bernstein c
 
 s = P eta + R eta' + c, z = (eta, eta'), z' = A z + constant, S = diag(|omega|, I). |S z'| is an energy norm of the
 velocities. Under a constant force its growth rate is at most sigma, mostly zero: it is positive for a growing mode
-(omega^2 < 0) and where friction that is proportional to pressure supplies energy (levels/sliding.py). So the values at
-the two ends bound it in between, for any constant force. A step that fails the test is computed again exactly
+(omega^2 < 0) and where friction that is proportional to pressure supplies energy (levels/level/sliding.py). So the
+values at the two ends bound it in between, for any constant force. A step that fails the test is computed again exactly
 (step_by_step.py): the test may fail without an event, but it never passes with one. Forces f on points add L f to s
 (modal_force.py), with the mean f of the step: the value at each end, with half its change as an error bound.
 

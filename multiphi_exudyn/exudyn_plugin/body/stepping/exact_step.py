@@ -24,7 +24,7 @@ from multiphi_exudyn.exudyn_plugin.body.stepping.surroundings import Instant, Su
 from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import AdvanceResult, ExactMotion
 from multiphi_exudyn.exudyn_plugin.coupling.modal_force import LevelForces
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 
 __all__ = ["BodyInStep", "Outcome", "Step", "exact_step"]
 

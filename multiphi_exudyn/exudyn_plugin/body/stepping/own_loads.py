@@ -19,7 +19,7 @@ from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.transitions.state import Phase, State
 from multiphi_exudyn.exudyn_plugin.body.stepping.certified_step import Conditions, conditions_of, jump_times
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.levels.model import MultiPhiModel
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.loads.loads import Load
 
 __all__ = ["OwnLoads"]

@@ -1,0 +1,204 @@
+"""Static response: contact forces and configuration under a load, in the coordinates of a base (38.5, with f_static).
+
+    y_e = Omega_e^-2 (f_e + P_e f),   f + K p.y = -G  (rigid: p.y = -gap),   P_0 f + f_0 = 0
+
+P the closed directions, f (d,) the forces along them; e elastic, 0 rigid-body coordinates. Along a single direction
+of a structure without rigid-body modes f is a quotient.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
+from multiphi_exudyn.levels.base.modal_base import ModalBase
+from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
+from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
+from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
+
+__all__ = ["Asymptotic", "response_of_neutral_level", "static_response"]
+
+NONE = np.zeros((0, 0))  # rigid-body motions of a structure that has none
+
+
+@dataclass(frozen=True)
+class Asymptotic:
+    """Static response of a level to gaps and static loads, x_inf of eq. (38.4).
+
+    configuration: y_inf (m,). gaps: of all links at y_inf (l,) [m]. forces: lambda_inf of the closed contacts (k,) [N].
+    drive: modal force (r,) on the zero-frequency modes, zero on the others. load: modal force Phi_l^T f (r,) of the
+    static load. strain, potential: strain energy of y_inf [J], and the same minus f.y_inf.
+    """
+
+    configuration: np.ndarray
+    gaps: np.ndarray
+    forces: np.ndarray
+    drive: np.ndarray
+    load: np.ndarray
+    strain: float
+    potential: float
+
+
+def static_response(
+    base: ModalBase, closed_directions: ClosedDirections, load: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return forces (d,) along closed directions and y (m,) of the static response, without unresisted motion."""
+    if len(closed_directions.stiffness) == 1 and not base.modes.rigid:
+        along, configuration = np.ascontiguousarray(closed_directions.vectors[:, 0]), np.empty(len(load))
+        stiffness, offset = float(closed_directions.stiffness[0]), float(closed_directions.offsets[0])
+        force = single_response(
+            along, base.compliance, np.array(load, float), configuration, stiffness, offset, len(load)
+        )
+        if math.isfinite(force):
+            return np.array([force]), configuration
+    orthogonal, mixing = closed_directions.orthogonal
+    forces, configuration = _response(base, orthogonal, load)
+    if orthogonal is not closed_directions:
+        forces[closed_directions.rigid] = np.linalg.solve(mixing, forces[closed_directions.rigid])
+    return forces, configuration
+
+
+@compiled
+def single_direction_response(
+    along: Numbers, compliance: Numbers, load: Numbers, result: Numbers, stiffness: float, offset: float, m: int
+) -> float:
+    """Return the force along one direction p (m,) and write y (m,) to the result; infinite or NaN without a solution.
+
+    The same as ``_response`` for one direction. The force is corrected once for round-off magnified by soft modes.
+    """
+    sprung = 1.0 if stiffness != 0.0 else 0.0
+    compliance_of_spring, deflection, loaded_deflection = 1.0 / stiffness if stiffness != 0.0 else 1.0, 0.0, 0.0
+    for i in range(m):
+        deflection += along[i] * (compliance[i] * along[i])
+        loaded_deflection += load[i] * (compliance[i] * along[i])
+    flexibility = compliance_of_spring + sprung * deflection
+    if flexibility == 0.0:
+        return math.inf
+    force, moved = (-offset - sprung * loaded_deflection) / flexibility, 0.0
+    for i in range(m):
+        contact_force = along[i] * force
+        total = load[i] + contact_force
+        if abs(total) <= ZERO * (abs(load[i]) + abs(contact_force)):
+            total = 0.0
+        result[i] = compliance[i] * total
+        moved += along[i] * result[i]
+    correction = -(offset + compliance_of_spring * force + sprung * moved) / flexibility
+    for i in range(m):
+        result[i] += compliance[i] * along[i] * correction
+    return force + correction
+
+
+single_response = entry(single_direction_response)
+
+
+def response_of_neutral_level(
+    base: ModalBase, closed_directions: ClosedDirections, neutral: np.ndarray, total: np.ndarray, closed: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (f, y, force on zero-frequency modes) where springs cancel the stiffness of modes ``neutral`` (m, z).
+
+    closed: names of the closed contacts.
+    """
+    if np.any(closed_directions.rigid):
+        raise NumericalFailure(
+            f"level {', '.join(closed)}: negative stiffness cancels that of a mode beside closed rigid contacts, so "
+            "there is no equilibrium"
+        )
+    driving = total - closed_directions.vectors @ closed_directions.constants
+    _, response = static_response(base, closed_directions, total - neutral @ (neutral.T @ driving))
+    configuration = response - neutral @ (neutral.T @ response)
+    return (
+        -closed_directions.constants - closed_directions.stiffness * (closed_directions.vectors.T @ configuration),
+        configuration,
+        driving,
+    )
+
+
+def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """``static_response`` where the directions of rigid contacts are orthogonal."""
+    rigid, compliance, offsets = base.modes.rigid, base.compliance, closed_directions.offsets
+    vectors, elastic_vectors, elastic_load = closed_directions.vectors, closed_directions.vectors[rigid:], load[rigid:]
+    sprung = closed_directions.stiffness != 0  # the others have the constant force G
+    spring_compliance, resisted = (
+        1 / np.where(sprung, closed_directions.stiffness, 1.0),
+        _resisted_motions(base, closed_directions),
+    )
+    deflections = (compliance * elastic_vectors.T).T
+    solve = _solver(elastic_vectors.T @ deflections, spring_compliance, sprung, vectors[:rigid].T @ resisted)
+    forces, rigid_motion = solve(-offsets - sprung * (elastic_load @ deflections), -(load[:rigid] @ resisted))
+    total = drop_round_off(
+        elastic_load + elastic_vectors @ forces, np.abs(elastic_load) + np.abs(elastic_vectors) @ np.abs(forces)
+    )
+    configuration = _with_rigid_motion(resisted, rigid_motion, compliance * total)
+    violation = offsets + spring_compliance * forces + sprung * (configuration @ vectors)
+    correction, rigid_motion = solve(-violation, np.zeros(len(rigid_motion)))  # round-off magnified by soft modes
+    return forces + correction, configuration + _with_rigid_motion(resisted, rigid_motion, deflections @ correction)
+
+
+def _resisted_motions(base: ModalBase, closed_directions: ClosedDirections) -> np.ndarray:
+    """Return an orthonormal basis (rigid, .) of the rigid-body motions that closed contacts resist."""
+    rigid = base.modes.rigid
+    if not rigid:
+        return NONE
+    return _range(closed_directions.resisting[:rigid], INDEPENDENT * closed_directions.size)
+
+
+def _with_rigid_motion(resisted: np.ndarray, rigid_motion: np.ndarray, elastic: np.ndarray) -> np.ndarray:
+    """Return coordinates (m,): of the resisted rigid-body motions, then elastic ones."""
+    return np.concatenate([resisted @ rigid_motion, elastic]) if len(resisted) else elastic
+
+
+Solver: TypeAlias = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+def _solver(flexibility: np.ndarray, spring_compliance: np.ndarray, sprung: np.ndarray, coupling: np.ndarray) -> Solver:
+    """Solver for f (d,), z (k,) of [[S F + C, S coupling], [coupling^T, 0]] (f, z) = (a, b), S = 0 or 1.
+
+    Unknowns and rows are scaled, so that pivots do not depend on units. Where springs cancel and the matrix is
+    singular, the solution is the shortest one.
+    """
+    d = len(spring_compliance)
+    sizes = _sizes(flexibility.diagonal() + sprung * np.abs(spring_compliance), coupling)
+    matrix = np.zeros((d + coupling.shape[1],) * 2)
+    matrix[:d, :d], matrix[:d, d:], matrix[d:, :d] = (
+        sprung[:, None] * flexibility,
+        sprung[:, None] * coupling,
+        coupling.T,
+    )
+    matrix.flat[: d * (len(matrix) + 1) : len(matrix) + 1] += spring_compliance
+    matrix *= sizes
+    lengths = np.abs(matrix).max(axis=1, initial=0.0)
+    rows = 1 / np.where(lengths > 0, lengths, 1.0)
+    scaled = rows[:, None] * matrix
+
+    def solve(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        right_side = rows * np.concatenate([a, b])
+        try:
+            solution = sizes * np.linalg.solve(scaled, right_side)
+        except np.linalg.LinAlgError:
+            solution = sizes * np.linalg.lstsq(scaled, right_side, rcond=None)[0]
+        return solution[:d], solution[d:]
+
+    return solve
+
+
+def _sizes(flexibilities: np.ndarray, coupling: np.ndarray) -> np.ndarray:
+    """Return the sizes (d + k,) of the unknowns, by which columns are scaled."""
+    forces = 1 / np.sqrt(np.where(flexibilities > 0, flexibilities, 1.0))
+    if not coupling.size:
+        return np.concatenate([forces, np.ones(coupling.shape[1])])
+    largest = float(np.max(np.abs(forces[:, None] * coupling))) or 1.0
+    return np.concatenate([forces, np.full(coupling.shape[1], 1 / largest)])
+
+
+def _range(matrix: np.ndarray, negligible: float) -> np.ndarray:
+    """Return an orthonormal basis of the column space; singular values up to ``negligible`` count as zero."""
+    if matrix.size == 0:
+        return np.zeros((matrix.shape[0], 0))
+    left, singular, _ = np.linalg.svd(matrix, full_matrices=False)
+    return left[:, singular > negligible]

@@ -1,0 +1,92 @@
+"""Level store: the base and the levels that models of one structure and the same contacts share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from multiphi_exudyn.levels.base.build_base import build_base
+from multiphi_exudyn.levels.base.modal_base import ModalBase
+from multiphi_exudyn.levels.level.build_level import build_level
+from multiphi_exudyn.levels.level.level import Level
+from multiphi_exudyn.levels.model.mode_choice import FIRST
+from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
+from multiphi_exudyn.mathematics.eigenproblems.lowest_modes import missing_flexibility
+from multiphi_exudyn.mechanics.elements.element import Element
+from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+
+__all__ = ["LevelStore"]
+
+CACHE_BYTES = 2**30  # of the cached levels of a model, with their data: 1 GiB, which leaves room on a laptop
+FEWEST_LEVELS = 8  # cached whatever their size: a run that alternates between them would else rebuild them
+
+
+class LevelStore:
+    """Base and levels of a structure with contacts, built on first use.
+
+    first: number of modes for which an incomplete base is built if no number is given. chosen: the number chosen then,
+    None before. base: None before it is built. load_rows: rows (k, n) of loads for the base. narrow: the model without
+    these rows. earlier: a store whose modes and rows are reused, if it is of the same structure.
+    """
+
+    def __init__(
+        self, structure: LinearStructure, contacts: Sequence[Element], earlier: LevelStore | None = None
+    ) -> None:
+        self.structure, self.contacts = structure, contacts
+        self.first, self.chosen = FIRST, None  # type: int, int | None
+        self.base: ModalBase | None = None
+        self.load_rows: np.ndarray | None = None
+        self.narrow: Any = None
+        self._previous_base: ModalBase | None = None
+        self._levels: BoundedCache[tuple[int, ...], Level] | None = None
+        self._missing: dict[bytes, float] = {}
+        if earlier is not None and earlier.structure is structure:
+            self.load_rows, self.narrow, self._previous_base = (
+                earlier.load_rows,
+                earlier.narrow,
+                earlier.base or earlier._previous_base,
+            )
+
+    def built_base(self, modes: int | None) -> ModalBase:
+        """Return the base, built on first use for levels with so many modes, None for all."""
+        if self.base is None:
+            self.base = build_base(self.structure, self.contacts, modes or "all", self._previous_base, self.load_rows)
+            self._previous_base = None
+        return self.base
+
+    def serves(self, modes: int | None) -> bool:
+        """Return whether the base is good for levels with so many modes, None for all."""
+        base = self.base
+        return base is not None and (base.complete or (modes is not None and modes <= base.most_level_modes))
+
+    def cache_capacity(self, r: int) -> int:
+        """Return the number of levels with r modes that fit into ``CACHE_BYTES``, with their data."""
+        assert self.base is not None, "levels need a base"
+        numbers_per_mode = self.base.modes.count + 30 * r + 2 * len(self.base.links)
+        return max(FEWEST_LEVELS, CACHE_BYTES // (8 * r * numbers_per_mode))
+
+    def level(self, indices: tuple[int, ...], modes: int) -> Level:
+        """Return a level with at least its lowest ``modes`` modes, or with all."""
+        base, levels = self.base, self._levels
+        assert base is not None, "levels need a base"
+        if levels is None:
+            levels = self._levels = BoundedCache(self.cache_capacity(modes))
+        most = base.modes.count - sum(base.links[i].rigid for i in indices)
+        needed, level, extra = min(modes, most), levels.find(indices), 1
+        while level is None or (level.modes < most and (level.modes < needed or level.apart(needed) is None)):
+            requested = needed + extra
+            level = levels.keep(indices, build_level(base, indices, requested if requested < most else None))
+            extra *= 2
+        return level
+
+    def outside(self, row: np.ndarray) -> float:
+        """Return the share of the static flexibility at a row (n,) that the base does not represent."""
+        base, key = self.base, row.tobytes()
+        if base is None or base.complete:
+            return 0.0
+        if key not in self._missing:
+            shares = missing_flexibility(self.structure.mass, self.structure.stiffness, base.modes, row[None, :])
+            self._missing[key] = float(shares[0])
+        return self._missing[key]
