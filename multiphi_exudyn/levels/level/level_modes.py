@@ -169,8 +169,7 @@ def _compliance_modes(
         vectors = _dense_eigenvectors(compliance, removed, modes)
     pinned = directions[:, np.isinf(stiffness)]
     if pinned.shape[1]:
-        constraints = np.linalg.qr(pinned)[0]
-        vectors = vectors - constraints @ (constraints.T @ vectors)
+        vectors = without(pinned, vectors)
     return _singular_value_modes(base, closed_directions, np.linalg.qr(vectors)[0])
 
 
