@@ -13,40 +13,44 @@ from random_campaign import apart, differences, judged, main
 
 import multiphi_exudyn as mp
 
-LIGHT = dict.fromkeys(KINDS, (3, 4)) | {
-    "functions": (0, 1),
-    "units": (0, 1),
-    "moving bases": (2, 3),
-    "rigid": (0, 1),
-    "several": (1, 2),
-    "sampled": (0, 1),
-    "truncated": (0, 1),
-    "friction": (0, 2),
-    "friction blocks": (1, 5),
-    "jenkins": (1, 11),
-    "friction loads": (1, 11),
-    "friction contacts": (2, 6),
-    "friction impacts": (0, 1),
-    "contact friction": (1, 2),
-    "rigid friction": (1, 2),
-    "friction limits": (1, 4),
-    "friction free": (1, 5),
-    "friction units": (5, 9),
-}  # quick ones
+LIGHT = dict.fromkeys(KINDS, 3) | {
+    "harmonic": 4,
+    "functions": 4,
+    "units": 0,
+    "moving stops": 4,
+    "moving bases": 4,
+    "rigid": 0,
+    "laws": 5,
+    "assembled": 4,
+    "clamps": 4,
+    "sampled": 1,
+    "truncated": 0,
+    "friction": 0,
+    "friction blocks": 1,
+    "jenkins": 11,
+    "friction loads": 1,
+    "friction contacts": 6,
+    "friction impacts": 0,
+    "contact friction": 1,
+    "rigid friction": 2,
+    "friction limits": 1,
+    "friction free": 1,
+    "friction units": 9,
+    "friction redundant": 0,
+}  # quick ones in which something happens; random_campaign.py runs many
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_scenes_of_every_kind_are_right(kind):
-    for number in LIGHT[kind]:
-        assert [verdict for verdict, _ in judged(kind, number)[0]] == ["ok"]
+def test_a_scene_of_every_kind_is_right(kind):
+    assert [verdict for verdict, _ in judged(kind, LIGHT[kind])[0]] == ["ok"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_loop_as_plain_python_gives_the_same_answer(kind):
-    for number in LIGHT[kind]:
-        model, end, x, v, loads = scaled(scene_of(kind, number))
-        runs = [mp.simulate(model, end, x, v, loads, compiled=compiled) for compiled in (None, False)]
-        assert apart(*runs) == ""
+    model, end, x, v, loads = scaled(scene_of(kind, LIGHT[kind]))
+    runs = [mp.simulate(model, end, x, v, loads, compiled=compiled) for compiled in (None, False)]
+    assert runs[0].events
+    assert apart(*runs) == ""
 
 
 @pytest.mark.parametrize(
@@ -277,7 +281,7 @@ class TestBruteForce:
         system = bf.System(np.eye(1), np.zeros((1, 1)), np.eye(1), [bf.Stop(np.ones(1), 1 - 1e-4, 1.0)])
         found = [
             len(bf.solved(system, np.array([math.cos(start)]), -np.array([math.sin(start)]), np.array([6.0])).events)
-            for start in np.linspace(0.2, 3, 281)
+            for start in np.linspace(0.2, 3, 94)
         ]
         assert set(found) == {2}
 
@@ -358,7 +362,7 @@ class TestBruteForceOfFriction:
 
     def test_a_block_at_rest_slides_from_the_instant_at_which_its_load_jumps(self):
         """Before its time the load was looked at as it had been: nothing moved, for ever at the same instant."""
-        for at in np.linspace(0.2, 1.8, 97):
+        for at in np.linspace(0.2, 1.8, 33):
             for load in (lambda t, at=at: np.where(t < at, 0.0, 2.0), lambda t, at=at: np.where(t <= at, 0.0, 2.0)):
                 given = [(self.ONE, bf.Course(load, breaks=(at,)))]
                 system = self.block(0.0, bf.Slider(self.ONE, 1.0, 1.0), loads=given)

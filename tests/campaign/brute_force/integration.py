@@ -141,20 +141,33 @@ class _Integration:
         curved[0] |= s[0] < 4 * np.abs(s[1] - s[0]) + 2 * np.abs(bends[0])
         curved[-1] |= s[-1] < 4 * np.abs(s[-1] - s[-2]) + 2 * np.abs(bends[-1])
         for j in np.flatnonzero(np.any(below | curved, axis=1)):
+            inside = self._inside(level, times[j], states[j])
             roots = [
-                self._root(level, i, times, states, j, allowed[j + 1, i]) for i in np.flatnonzero(below[j] | curved[j])
+                self._root(level, i, times, j, allowed[j + 1, i], inside) for i in np.flatnonzero(below[j] | curved[j])
             ]
             roots = [root for root in roots if root is not None]
             if roots:
                 return j, min(roots)
         return None
 
-    def _root(self, level, i, times, states, j, allowed):
-        width, at = times[j + 1] - times[j], self.levels.inside(level, states[j], times[j])
+    def _inside(self, level, t, y):
+        """States and inputs at instants inside a step from (y, t): what one signal has asked for is kept for others."""
+        at, kept = self.levels.inside(level, y, t), {}
+
+        def inside(taus):
+            key = taus.tobytes()
+            if key not in kept:
+                kept[key] = at(taus), self.levels.behind(t + taus)
+            return kept[key]
+
+        return inside
+
+    def _root(self, level, i, times, j, allowed, inside):
+        width = times[j + 1] - times[j]
 
         def s(tau):
-            taus = np.atleast_1d(tau)
-            values = level.signals[i] @ at(taus) + self.levels.behind(times[j] + taus) @ level.signal_inputs[i]
+            states, inputs = inside(np.atleast_1d(tau))
+            values = level.signals[i] @ states + inputs @ level.signal_inputs[i]
             return values if np.ndim(tau) else float(values[0])
 
         moment = SOON * min(width, STEP / self.levels.rate_of_all)

@@ -33,6 +33,14 @@ class Level:
     slips: tuple
     steps: dict = field(default_factory=dict)
 
+    @functools.cached_property
+    def responses(self):
+        """A^i W / i! of all inputs but the constant one, side by side (y, i w): of the exponential's series."""
+        parts = [self.inputs[:, 1:]]
+        for i in range(1, TERMS + 1):
+            parts.append(self.matrix @ parts[-1] / i)
+        return np.hstack(parts)
+
     def step(self, h):
         """exp(A h), and what the inputs at the nodes of a step add, (y, nodes w)."""
         key = float(f"{h:.11e}")
@@ -256,20 +264,17 @@ class Levels:
         vectors = [y, level.matrix @ y + level.inputs[:, 0]]
         for i in range(2, TERMS + 1):
             vectors.append(level.matrix @ vectors[-1] / i)
-        series, powers, varying = np.array(vectors).T, np.arange(TERMS + 1), level.inputs[:, 1:]
+        series, powers, responses = np.array(vectors).T, np.arange(TERMS + 1), level.responses
 
         def at(tau):
             taus = np.atleast_1d(tau)
             moved = series @ taus ** powers[:, None]
-            if varying.size:
+            if responses.size:
                 times = taus[:, None] * NODES
-                part = varying @ (self.inputs((t + times).ravel())[:, 1:] * (taus[:, None] * WEIGHTS).reshape(-1, 1)).T
-                left = (taus[:, None] - times).ravel()
-                total = part.copy()
-                for i in range(1, TERMS + 1):
-                    part = level.matrix @ part * (left / i)
-                    total += part
-                moved = moved + total.reshape(len(y), len(taus), len(NODES)).sum(axis=2)
+                given = self.inputs((t + times).ravel())[:, 1:].reshape(*times.shape, -1)
+                left = (taus[:, None] - times) ** powers[:, None, None] * (taus[:, None] * WEIGHTS)
+                moments = np.einsum("ikq,kqw->iwk", left, given)
+                moved = moved + responses @ moments.reshape(-1, len(taus))
             return moved if np.ndim(tau) else moved[:, 0]
 
         return at
