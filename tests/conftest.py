@@ -12,7 +12,7 @@ from hypothesis import settings
 
 from multiphi_exudyn.errors import MultiPhiError
 from multiphi_exudyn.study.comparison import figure_style
-from multiphi_exudyn.study.running import timing
+from multiphi_exudyn.study.running import runner, timing
 from reference_models.exudyn_quiet import quiet
 
 settings.register_profile("deterministic", derandomize=True, deadline=None)
@@ -26,9 +26,13 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def short_timing() -> Iterator[None]:
-    """Runs of milliseconds are not repeated until their time is steady: nobody looks at it."""
+    """Runs are repeated once, and not until their time is steady: nobody looks at it.
+
+    Who does sets ``runner.repeated`` back to ``timing.repeated``.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(timing, "STEADY_S", 0.0)
+        patch.setattr(runner, "repeated", lambda run, first, fewest: timing.repeated(run, first, min(fewest, 1)))
         yield
 
 

@@ -3,7 +3,7 @@
 Chains and beams whose frequencies are known in closed form are the reference.
 """
 
-import itertools
+import functools
 import math
 
 import numpy as np
@@ -45,6 +45,13 @@ def free_beam(elements, *, scale=1.0):
     return planar_beam(Beam([section], {"tip": scale}, clamp=Clamp(0.0, 0.0)), elements=elements)
 
 
+@functools.cache
+def free_beam_modes(elements, *, scale=1.0):
+    """That beam and all its modes."""
+    structure = free_beam(elements, scale=scale)
+    return structure, complete_modes(np.asarray(structure.mass), np.asarray(structure.stiffness))
+
+
 def seen_of(cluster, omega, given):
     """What an iteration without round-off sees of modes (n, k) of one frequency: omega^2 (1,) and the shape (n, 1)."""
     shape = cluster @ (cluster.T @ given[-1])
@@ -79,11 +86,9 @@ class TestCompleteModes:
         assert_allclose(modes.shapes.T @ stiffness @ modes.shapes, np.diag(modes.omega**2), atol=1e-11)
         assert np.all(np.diff(modes.omega) >= 0)
 
-    @pytest.mark.parametrize("scale", [1.0, 1e3], ids=["m", "mm"])
-    @pytest.mark.parametrize("elements", [10, 40, 120, 300])
+    @pytest.mark.parametrize(("elements", "scale"), [(10, 1e3), (40, 1.0), (120, 1e3), (300, 1.0)])
     def test_a_free_beam_has_two_rigid_body_modes_however_fine(self, elements, scale):
-        structure = free_beam(elements, scale=scale)
-        modes = complete_modes(np.asarray(structure.mass), np.asarray(structure.stiffness))
+        structure, modes = free_beam_modes(elements, scale=scale)
         assert modes.rigid == 2
         assert np.all(modes.omega[:2] == 0)
         section = math.sqrt(2.1e11 / 7800) * 0.005 / math.sqrt(12)
@@ -93,10 +98,7 @@ class TestCompleteModes:
 
     def test_first_bending_mode_converges_and_does_not_drown_in_round_off(self):
         """A cubic element's error falls as h^4; past 1e-8 the same number must stand still, not wander."""
-        omega = [
-            complete_modes(np.asarray(s.mass), np.asarray(s.stiffness)).omega[2]
-            for s in (free_beam(n) for n in (80, 150, 300))
-        ]
+        omega = [free_beam_modes(n, scale=1.0)[1].omega[2] for n in (80, 150, 300)]
         assert_allclose(omega[0], omega[2], rtol=5e-8)
         assert_allclose(omega[1], omega[2], rtol=5e-9)
 
@@ -181,7 +183,7 @@ class TestLowestModes:
     @pytest.mark.parametrize("copies", range(2, 25))
     def test_no_copy_of_a_mode_is_missed(self, copies):
         """Equal chains side by side, looked for in numbers below and above that of the copies."""
-        for n, count in itertools.product((30, 47), (3, 10)):
+        for n, count in ((30, 3), (47, 10)) if copies % 2 else ((30, 10), (47, 3)):
             mass, stiffness = (scipy.sparse.block_diag([m] * copies, format="csr") for m in chain(n, ends=2))
             found = lowest_modes(mass, stiffness, count, np.zeros((0, n * copies)))
             assert found.exact % copies == 0
