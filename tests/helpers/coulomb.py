@@ -20,7 +20,7 @@ class Coulomb:
 
     def __init__(self, structure, contacts, force=None, longest=0.02):
         self.n, self.contacts, self.longest = structure.n, contacts, longest
-        self.mass, self.stiffness = np.asarray(structure.mass), np.asarray(structure.stiffness)
+        self.inverse, self.stiffness = np.linalg.inv(np.asarray(structure.mass)), np.asarray(structure.stiffness)
         given = structure.damping
         self.damping = np.zeros_like(self.stiffness) if given is None else np.asarray(given)
         self.normals = [structure.row(c.direction) for c in contacts]
@@ -55,13 +55,13 @@ class Coulomb:
             free = free - self.tangents[i] * tensions[i]
         if stuck:
             rows = np.array([self.tangents[i] for i in stuck])
-            inverse = np.linalg.inv(self.mass)
-            tensions[stuck] = np.linalg.solve(rows @ inverse @ rows.T, rows @ inverse @ free)
+            share = rows @ self.inverse
+            tensions[stuck] = np.linalg.solve(share @ rows.T, share @ free)
             free = free - rows.T @ tensions[stuck]
         return tensions, free
 
     def slope(self, t, z):
-        return np.concatenate([z[self.n :], np.linalg.solve(self.mass, self.forces(t, z)[1])])
+        return np.concatenate([z[self.n :], self.inverse @ self.forces(t, z)[1]])
 
     def slip_end(self, i, sign):
         """s (h_t.x' - v - s mu N' / k_t), falling through zero."""

@@ -25,7 +25,8 @@ def integrated(
 
     moved(t, i): way of stop i. breaks: where the load is not smooth. longest: step, so that no event is stepped over.
     """
-    n, mass, stiffness = structure.n, np.asarray(structure.mass), np.asarray(structure.stiffness)
+    n, stiffness = structure.n, np.asarray(structure.stiffness)
+    inverse = np.linalg.inv(np.asarray(structure.mass))
     damping = np.zeros((n, n)) if structure.damping is None else np.asarray(structure.damping)
     rows = [structure.row(contact.direction) for contact in contacts]
 
@@ -41,7 +42,7 @@ def integrated(
         for i, contact in enumerate(contacts):
             if closed[i]:
                 force = force - contact.stiffness * gap(t, y, i) * rows[i]
-        return np.concatenate([y[n:], np.linalg.solve(mass, force)])
+        return np.concatenate([y[n:], inverse @ force])
 
     for end in [*sorted(b for b in breaks if 0 < b < times[-1]), times[-1]]:
         while t < end:

@@ -63,19 +63,17 @@ def linear_response(structure, force_at, force, start, time):
     """Modal coordinates (n, k) under a force (k,) that is linear between samples; exact in time."""
     omega, phi = modes(structure)
     zeta, load = ratios_of(omega), phi.T @ structure.row(force_at)
-    eta = np.zeros((len(omega), len(time)))
-    for i, (w, z) in enumerate(zip(omega, zeta, strict=True)):
-        system = (
-            np.array([[0, 1], [-w * w, -2 * z * w]]),
-            np.array([[0], [load[i]]]),
-            np.eye(2),
-            np.zeros((2, 1)),
-        )
+    parts = []
+    for w, z, of_force in zip(omega, zeta, load, strict=True):
+        system = np.array([[0, 1], [-w * w, -2 * z * w]]), np.array([[0], [of_force]]), np.eye(2), np.zeros((2, 1))
         a, b, _, d, _ = cont2discrete(system, time[1] - time[0], method="foh")
-        state = np.array([phi[:, i] @ structure.mass @ start, 0.0]) - d[:, 0] * force[0]
-        for k, f in enumerate(force):
-            eta[i, k] = state[0] + d[0, 0] * f
-            state = a @ state + b[:, 0] * f
+        parts.append((a, b[:, 0], d[:, 0]))
+    a, b, d = (np.array(part) for part in zip(*parts, strict=True))
+    state = np.column_stack([phi.T @ structure.mass @ start, np.zeros(len(omega))]) - d * force[0]
+    eta = np.zeros((len(omega), len(time)))
+    for k, f in enumerate(force):
+        eta[:, k] = state[:, 0] + d[:, 0] * f
+        state = np.einsum("ijk,ik->ij", a, state) + b * f
     return {name: (row @ phi) @ eta for name, row in structure.points.items()}
 
 

@@ -15,6 +15,7 @@ from multiphi_exudyn.time.loop import chatter
 
 EXACT = 1e-8  # the round-off of finite differences, magnified by modes that hardly decay
 OWN = 1e-6  # of the integrator at its tolerances
+SETTLED = 215.0  # s, in which a motion of the bilinear oscillator decays to 3e-6
 
 
 def bilinear(gap=0.5, ratio=0.03):
@@ -29,12 +30,13 @@ def integrated(model, load, x, v, periods):
     omega = 2 * math.pi * load.frequency_hz
 
     def rates(t, y):
-        pushed = contact.stiffness * max(0.0, -(contact.gap + y[0]))
-        return [y[1], (load.amplitude * math.cos(omega * t) - damping * y[1] - 8.0 * y[0] + pushed) / 2.0]
+        x, v = y.tolist()
+        pushed = contact.stiffness * max(0.0, -(contact.gap + x))
+        return [v, (load.amplitude * math.cos(omega * t) - damping * v - 8.0 * x + pushed) / 2.0]
 
     end = periods / load.frequency_hz
     times = np.linspace(end - 1 / load.frequency_hz, end, 2001)
-    limits = {"rtol": 1e-10, "atol": 1e-12, "max_step": 0.02 / load.frequency_hz}
+    limits = {"rtol": 1e-10, "atol": 1e-12, "max_step": 0.05 / load.frequency_hz}
     return solve_ivp(rates, (0, end), [x, v], method="DOP853", t_eval=times, **limits).y[0]
 
 
@@ -81,10 +83,10 @@ def test_a_mode_that_rings_for_thousands_of_periods_is_not_waited_for():
 def test_a_bilinear_oscillator_settles_where_an_integrator_does(hz, size):
     model, load = bilinear(), mp.HarmonicLoad("m0", 1.0, hz)
     state = mp.steady_state(model, load, displacement=np.array([size]), tolerance=1e-9)
-    x = integrated(model, load, size, 0.0, 150)
+    x = integrated(model, load, size, 0.0, math.ceil(SETTLED * hz))
     times = np.linspace(0, state.trajectory.t_end, 2001)
     assert (state.status, state.order) == ("periodic", 1)
-    assert np.max(np.abs(state.trajectory.at("m0", times) - x)) < 1e2 * OWN  # what has not decayed in 150 periods
+    assert np.max(np.abs(state.trajectory.at("m0", times) - x)) < 1e2 * OWN  # what has not decayed
     assert state.duty("stop") == pytest.approx(float(np.mean(x < -0.5)), abs=1e-3)
 
 

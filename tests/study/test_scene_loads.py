@@ -33,7 +33,7 @@ LOADS = {
 MODELS = [
     {"kind": "reduced", "name": "r12", "modes": 12},
     {"kind": "user-object", "name": "body", "modes": 6, "step": 2e-4},
-    {"kind": "full", "name": "full", "elements": 4, "step": 5e-5},
+    {"kind": "full", "name": "full", "elements": 4, "step": 1e-4},
 ]
 
 

@@ -8,7 +8,7 @@ from integrated import integrated
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.excitation.excitation import MOST_EFFORT
+from multiphi_exudyn.events.excitation import excitation
 from multiphi_exudyn.time.reliability import run_warnings
 
 TIMES = np.linspace(0.0, 2.0, 81)
@@ -130,11 +130,12 @@ class TestManyPieces:
         force = time + 1e-10 * time**2
         assert np.max(np.abs(mp.Sampled(time, force).history(1.0).at(time[:-1]) - force[:-1])) <= 2e-15
 
-    def test_more_than_a_run_can_take_are_refused_with_their_number_before_it_begins(self, refused):
-        time = np.linspace(0.0, 1.0, MOST_EFFORT + 2)
+    def test_more_than_a_run_can_take_are_refused_with_their_number_before_it_begins(self, refused, monkeypatch):
+        monkeypatch.setattr(excitation, "MOST_EFFORT", 2**14)
+        time = np.linspace(0.0, 1.0, 2**14 + 2)
         load = mp.SampledLoad("m0", time, np.random.default_rng(0).normal(size=len(time)))
         model = mp.MultiPhiModel(chain(1), modes="all")
-        begins = f"loads: got {MOST_EFFORT + 1} pieces in 1 s, need at most {MOST_EFFORT}"
+        begins = f"loads: got {2**14 + 1} pieces in 1 s, need at most {2**14}"
         refused(ValueError, begins, mp.simulate, model, 1.0, loads=[load])
 
     def test_a_sweep_over_many_decades_is_bounded_before_it_begins(self, refused):
