@@ -109,8 +109,7 @@ class TestAlone:
 class TestCoupled:
     """Beside the whole structure in one model."""
 
-    @pytest.mark.parametrize("kind", KINDS)
-    @pytest.mark.parametrize("point", ["x", "y"])
+    @pytest.mark.parametrize(("kind", "point"), list(zip(KINDS, "xyxyx", strict=True)))
     def test_a_mass_where_it_rubs_or_presses_converges_with_order_two(self, kind, point):
         mass, stiffness, damping = matrices()
         mass[POINTS[point], POINTS[point]] += 0.7

@@ -86,7 +86,7 @@ def test_the_forced_response_is_the_particular_one(damping, rate, horizon, degre
     assert_allclose(x, expected, rtol=0, atol=1e-13 * np.max(np.abs(expected)))
 
 
-@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize("seed", range(40))
 def test_it_is_so_for_any_modes_and_loads(seed):
     random = np.random.default_rng(seed)
     r = int(random.integers(1, 6))

@@ -138,10 +138,11 @@ class TestCoupledImpact:
         assert run.events[0].loss.impact > 0
         assert abs(run.ledger.residual) < 1e-12 * run.ledger.work_of_loads
 
-    @pytest.mark.parametrize("compiled", [None, False])
+    @pytest.mark.parametrize(
+        ("speed", "compiled"), [(-2.0, None), (-0.3, False), (0.5, None), (0.5, False), (2.0, None)]
+    )
     @pytest.mark.parametrize("restitution", [0.3, 0.9, 1.0])
     @pytest.mark.parametrize("friction", [0.1, 0.5, 1.5])
-    @pytest.mark.parametrize("speed", [-2.0, -0.3, 0.5, 2.0])
     def test_with_restitution_gives_back_impulse_as_poisson_says(self, speed, friction, restitution, compiled):
         """Of Newton's law speed 0.5, friction 0.5 and e 0.9 make energy (Kane's paradox)."""
         mass = np.array([[1.0, 0.5], [0.5, 1.0]])

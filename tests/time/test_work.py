@@ -58,11 +58,17 @@ def assert_works_of_segments(run):
     assert abs(run.ledger.residual) <= 1e-12 * size
 
 
-@pytest.mark.parametrize("damping", DAMPINGS.values(), ids=DAMPINGS)
-@pytest.mark.parametrize("elements", ELEMENTS.values(), ids=ELEMENTS)
-@pytest.mark.parametrize("loads", LOADS.values(), ids=LOADS)
+def every_pair():
+    """Names (load, elements, damping): every two of different kinds meet."""
+    dampings = list(DAMPINGS)
+    for i, load in enumerate(LOADS):
+        for j, elements in enumerate(ELEMENTS):
+            yield load, elements, dampings[(i + j) % len(dampings)]
+
+
+@pytest.mark.parametrize(("loads", "elements", "damping"), list(every_pair()))
 def test_works_are_those_of_each_segment(loads, elements, damping):
-    assert_works_of_segments(run_of(damping, elements, loads))
+    assert_works_of_segments(run_of(DAMPINGS[damping], ELEMENTS[elements], LOADS[loads]))
 
 
 @pytest.mark.parametrize("damping", DAMPINGS.values(), ids=DAMPINGS)
