@@ -201,6 +201,11 @@ def test_a_speed_is_no_round_off_of_a_place():
     assert judged("friction units", 20014)[0] == [("ok", "")]
 
 
+def test_a_ledger_has_the_round_off_of_loads_that_hardly_move_what_slips():
+    """7 N, which would move it by 0.6 m, slip it by 3e-8 m: its work is a difference of terms of 4 J."""
+    assert judged("friction loads", 1200025)[0] == [("ok", "")]
+
+
 def test_a_scene_comes_from_its_kind_and_number_alone():
     first, again, other = scene_of("rigid", 4), scene_of("rigid", 4), scene_of("rigid", 5)
     assert np.array_equal(first.velocity, again.velocity)

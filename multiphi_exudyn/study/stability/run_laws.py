@@ -16,7 +16,7 @@ from multiphi_exudyn.mathematics.round_off import ZERO
 from multiphi_exudyn.mechanics.elements.element import Element
 from multiphi_exudyn.mechanics.elements.friction import Friction
 from multiphi_exudyn.study.stability.run_signals import Signal
-from multiphi_exudyn.time.segments.segment import Segment
+from multiphi_exudyn.time.segments.segment import Segment, as_segments
 from multiphi_exudyn.time.trajectory.ledger import Ledger
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
@@ -93,6 +93,8 @@ def largest_energy(run: Trajectory, segments: Sequence[Segment], joule: float = 
     passed = PASSED * abs(run.model.level(()).asymptotic(run.load).potential)
     passed = max(passed, PASSED * max((abs(event.loss.truncation_strain) for event in run.events), default=0.0))
     passed = max(passed, PASSED * _stretched(run), PASSED * max(_summed(run, segment) for segment in segments))
+    entered = [run.segments[first] for first in np.unique(as_segments(run.segments).numbers, return_index=True)[1]]
+    passed = max(passed, PASSED * max(map(_potential_terms, entered)))
     return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), SMALLEST * joule, rests, passed)
 
 
@@ -116,6 +118,14 @@ def _potential(segment: Segment) -> float:
     """The larger one [J] of a level at rest, and where a segment starts: there a varying load has its present value."""
     start = segment.modal(np.array([segment.start]))[:, 0]
     return max(abs(segment.level.asymptotic.potential), abs(segment.level.potential(start)))
+
+
+def _potential_terms(segment: Segment) -> float:
+    """Absolute terms [J] of a level's potential where a segment starts; of a load on what hardly moves they cancel."""
+    form, start = segment.level.potential_form, np.abs(segment.modal(np.array([segment.start]))[:, 0])
+    r = len(form.squares)
+    eta, w, rows = start[:r], start[r:], np.abs(form.rows)
+    return float(0.5 * np.abs(form.squares) @ eta**2 + w @ (rows[:, :r] @ eta + 0.5 * rows[:, r:] @ w))
 
 
 def _ledger_of_trajectory(run: Trajectory) -> Ledger:
