@@ -1,6 +1,5 @@
 """What a newcomer has: a file to start from, a check without a run, and a study of what the subject is about."""
 
-import functools
 import json
 from pathlib import Path
 
@@ -8,18 +7,9 @@ import pytest
 from small_study import result_of, row
 
 from multiphi_exudyn import MultiPhiValueError, cli, study
-from multiphi_exudyn.cli import file_commands
 from multiphi_exudyn.study import load
 from multiphi_exudyn.study.accuracy.study_result import csv_text
 from multiphi_exudyn.study.scene.places import with_value
-
-
-@pytest.fixture(autouse=True, scope="module")
-def shipped():
-    """What is shipped is read once and not by every command."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(file_commands, "shipped_studies", functools.cache(file_commands.shipped_studies))
-        yield
 
 
 @pytest.fixture

@@ -131,8 +131,8 @@ class Study:
 
 def shipped_studies() -> dict[str, str]:
     """name -> title of the studies that come with the package."""
-    names = sorted(path.stem for path in _shipped_folder().glob("*.toml"))
-    return {name: load_study(name).file.title for name in names}
+    paths = sorted(_shipped_folder().glob("*.toml"), key=lambda path: path.stem)
+    return {path.stem: str(read_toml(path)["title"]) for path in paths}
 
 
 def load_study(source: str, *, quick: bool = False) -> Study:
