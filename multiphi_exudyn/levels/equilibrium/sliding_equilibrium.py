@@ -66,7 +66,7 @@ def _check_unique(base: ModalBase, sliders: list[int], friction_forces: np.ndarr
             )
     for subset, minor in minors.items():
         if not minor > UNIQUE:
-            names = ", ".join(repr(base.label(sliders[k])) for k in subset)
+            names = ", ".join(repr(base.labels[sliders[k]]) for k in subset)
             raise NumericalFailure(
                 f"static equilibrium: friction wedges at the contact {names}: det(I - W) = {minor:.6g}, W being the "
                 "contact force that one newton of it brings back by friction, so the equilibrium is not unique; need a "

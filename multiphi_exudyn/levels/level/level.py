@@ -160,7 +160,7 @@ class Level(Shown):
         base = self.base
         closed_directions, _ = base.closed_at(self.indices).orthogonal
         springs, flexibilities = np.flatnonzero(~closed_directions.rigid), self._flexibilities(closed_directions)
-        names = [base.label(closed_directions.members[s][0]) for s in springs.tolist()]
+        names = [base.labels[closed_directions.members[s][0]] for s in springs.tolist()]
         rows = closed_directions.vectors[:, springs].T
         open_flexibility = np.sum((rows * base.periods) ** 2, axis=1)
         kept = (rows @ self.vectors) ** 2 / np.where(self.computed == 0, np.inf, self.computed)

@@ -151,7 +151,8 @@ def _check_unique_motion(plain: Level, sliders: tuple[int, ...], reactions: np.n
         for subset in itertools.combinations(range(len(sliders)), count):
             minor = float(np.linalg.det(remaining[np.ix_(subset, subset)]))
             if not minor > DETERMINATE:
-                names = ", ".join(repr(plain.base.label(plain.base.oblique[plain.indices[sliders[k]]])) for k in subset)
+                links = (plain.base.oblique[plain.indices[sliders[k]]] for k in subset)
+                names = ", ".join(repr(plain.base.labels[link]) for link in links)
                 raise NumericalFailure(
                     f"friction at the rigid contact {names}: sliding has no unique motion, as h.M^-1 (h - s mu h_t) is "
                     f"{minor:.6g} of h.M^-1 h in the kept modes; need a smaller coefficient, for which it is positive, "

@@ -89,11 +89,15 @@ class ElementTable:
         """Forces (2, l) of links along their directions for a unit gap and a unit gap velocity: -springs, -dampings."""
         return -np.stack([self.springs, self.dampings])
 
-    def label(self, link: int) -> str:
-        """Name of a link; that of its element for links of force laws and of sliding contacts."""
-        element = next(i for i, indices in enumerate(self.link_indices) if link in indices)
-        has_element_name = element in self.laws or link in self.oblique
-        return self.links[element if has_element_name else link].name
+    @functools.cached_property
+    def labels(self) -> tuple[str, ...]:
+        """Names of all links (l,); those of their elements for links of force laws and of sliding contacts."""
+        named = list(range(len(self.links)))
+        for element, indices in enumerate(self.link_indices):
+            for link in indices:
+                if element in self.laws or link in self.oblique:
+                    named[link] = element
+        return tuple(self.links[k].name for k in named)
 
     def pressing_links(self, element: int) -> list[int]:
         """Indices of the links that press in the closed states of a contact, with and without friction.
