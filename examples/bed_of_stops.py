@@ -120,7 +120,7 @@ def _plot_cost(axes: plt.Axes, costs: list[Cost]) -> None:
     axes.set(xlabel="degrees of freedom", ylabel="CPU time [ms]", title="Cost")
     axes.set_xticks(n, [str(each) for each in n])
     axes.minorticks_off()
-    axes.legend()
+    axes.legend(loc="center right")
 
 
 def main(arguments: list[str], stops: int = STOPS, t_end: float = T_END) -> list[Cost]:
