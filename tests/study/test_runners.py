@@ -247,6 +247,15 @@ def test_short_runs_are_repeated_until_their_time_is_steady_and_long_ones_once(m
     assert repeated(lambda: 0.001, 0.001, 0) == ()
 
 
+@pytest.mark.parametrize(("name", "counts"), [("compliant", False), ("full", True)])
+def test_a_first_run_that_builds_levels_is_no_measure_of_a_repeat(setup, monkeypatch, name, counts):
+    """However long it takes, repeats follow; a full beam that takes as long is not run again."""
+    told = []
+    monkeypatch.setattr(runner, "repeated", lambda run, first, fewest: told.append(first) or ())
+    run_model(setup, name)
+    assert (told[0] > 0) == counts
+
+
 def test_the_loop_is_compiled_before_the_clock_starts(setup, monkeypatch):
     called = []
     for module, name in ((runner, "compile_entries"), (reduced_runner, "simulate")):

@@ -68,7 +68,8 @@ class Runner(ABC):
             compile_entries()
         prepared, preparation_s = timed(self.prepare)
         answer, first = self.solve(prepared)
-        repeats = repeated(lambda: self.solve(prepared)[1], first, self.repeats(answer))
+        known = 0.0 if self.compiled else first  # the first run builds levels, which takes most of its time
+        repeats = repeated(lambda: self.solve(prepared)[1], known, self.repeats(answer))
         run = ModelRun(
             name=self.spec.name,
             kind=self.spec.kind,

@@ -22,9 +22,10 @@ def timed(run: Callable[[], T]) -> tuple[T, float]:
 
 
 def repeated(run: Callable[[], float], first: float, fewest: int) -> tuple[float, ...]:
-    """Times [s] of the repeats of a run, which returns its time and took ``first`` [s] before.
+    """Times [s] of the repeats of a run, which returns its time.
 
-    At least ``fewest`` repeats (0: none), fewer where REPEAT_BUDGET_S ends, more for short runs until STEADY_S.
+    first: what it took before [s], 0 where that says nothing of a repeat. At least ``fewest`` repeats (0: none), fewer
+    where REPEAT_BUDGET_S ends, more for short runs until STEADY_S.
     """
     repeats: list[float] = []
     spent = 0.0
