@@ -383,6 +383,10 @@ class TestCampaign:
         """A plastic impact leaves 1e-16 of a speed: bounces of it, or of a gap that faces the stop, never end."""
         assert verdicts(number) == [("ok", "")]
 
+    def test_a_reaction_has_the_round_off_of_a_level_whose_equilibrium_is_far_away(self):
+        """While it is open a soft spring would hold 19 N at 7.4 m; closed, a stiff one turns 4e-16 m into 1e-8 N."""
+        assert verdicts(7014936) == [("ok", "")]
+
     def test_goes_on_where_it_was(self, tmp_path, capsys):
         arguments = ["--processes", "1", "--out", str(tmp_path / "chunks"), "--count"]
         assert main([*arguments, "2"]) == 0

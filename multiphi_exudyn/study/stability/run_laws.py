@@ -203,9 +203,11 @@ def missed(
 
     In a truncated basis this is checked for armed contacts and for closed rigid ones, which never pull. Round-off is
     that of the whole run: an impact that stops all motion leaves a state that is round-off of the one before, and a
-    reaction is zero to the law where it is within ZERO of the terms that coordinates of the run make of it.
+    reaction is zero to the law where it is within ZERO of the terms that coordinates of the run make of it, or within
+    round-off of the terms of which coordinates are the sum: a level may move about an equilibrium that is far away.
     """
     complete, reach = _complete(run), _reach(segments, SMALLEST * metre)
+    blurred = max(ZERO * reach, ROUND_OFFS * np.finfo(float).eps * max(map(_coordinate_terms, segments)))
     largest: dict[tuple[int, str], float] = {}
     checked = list(_signals(segments, run, complete))
     for segment, contact, _, signal in checked:
@@ -218,7 +220,7 @@ def missed(
         size = largest[contact, signal.of]
         lowest, at = signal.lowest(segment.end - segment.start, samples)
         unresolved = ROUND_OFFS * np.finfo(float).eps * segment.end * signal.steepness(at)
-        unresolved += ZERO * signal.grain * reach
+        unresolved += signal.grain * blurred
         if lowest < -(MISSED if armed else LAW) * size - unresolved:
             name = run.model.contacts[contact].name
             return f"missed: {name} at {segment.start + at:.9g} s, {lowest / size:g} of its size"
@@ -261,6 +263,13 @@ def _reach(segments: Sequence[Segment], smallest: float) -> float:
     times = [np.linspace(segment.start, segment.end, INSIDE) for segment in segments]
     places = [segment.level.configuration(segment.modal(t)) for segment, t in zip(segments, times, strict=True)]
     return max([smallest, *(float(np.max(np.abs(y), initial=0.0)) for y in places)])
+
+
+def _coordinate_terms(segment: Segment) -> float:
+    """Largest sum of the absolute terms of a coordinate y where a segment starts."""
+    level, start = segment.level, segment.modal(np.array([segment.start]))[:, 0]
+    terms = np.abs(level.level.vectors) @ np.abs(start) + np.abs(level.asymptotic.configuration)
+    return float(np.max(terms, initial=0.0))
 
 
 def _complete(run: Trajectory) -> bool:
