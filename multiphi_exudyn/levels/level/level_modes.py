@@ -44,7 +44,7 @@ __all__ = ["level_modes"]
 
 NEARLY_INDEFINITE = 0.5  # share of a stiffness that negative springs may take before mu is needed
 FEW = 4  # modes of the base for each requested mode, from which the compliance matrix is cheaper
-CHANGES = 130_000  # coordinates of all modes between rank-one changes, up to which these are cheaper
+CHANGES = 130_000  # (d - 1) m^2, up to which d rank-one changes in a base of m modes cost less than iterations
 SECULAR = 50  # modes of a base from which roots of the secular equation are cheaper than all singular values
 LARGE = 150  # modes of a base, from which Lanczos iterations of the compliance matrix are cheaper
 ORTHOGONAL = 1e-12  # product of two modes, above which they are recomputed in the space that they span

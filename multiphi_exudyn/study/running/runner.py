@@ -68,8 +68,8 @@ class Runner(ABC):
             compile_entries()
         prepared, preparation_s = timed(self.prepare)
         answer, first = self.solve(prepared)
-        known = 0.0 if self.compiled else first  # the first run builds levels, which takes most of its time
-        repeats = repeated(lambda: self.solve(prepared)[1], known, self.repeats(answer))
+        as_long = 0.0 if self.compiled else first  # a first run that builds levels takes longer than a repeat
+        repeats = repeated(lambda: self.solve(prepared)[1], as_long, self.repeats(answer))
         run = ModelRun(
             name=self.spec.name,
             kind=self.spec.kind,

@@ -108,6 +108,11 @@ def _stretched(run: Trajectory) -> float:
     )
 
 
+def _start(segment: Segment) -> np.ndarray:
+    """Coordinates xi (n,) where a segment starts."""
+    return segment.modal(np.array([segment.start]))[:, 0]
+
+
 def _summed(run: Trajectory, segment: Segment) -> float:
     """Work [J] of the loads over the absolute terms of a motion, which may cancel (t and exp(-c t) with damping)."""
     terms = np.abs(segment.level.level.vectors) @ np.sum(np.abs(segment.rows), axis=1)
@@ -116,16 +121,21 @@ def _summed(run: Trajectory, segment: Segment) -> float:
 
 def _potential(segment: Segment) -> float:
     """The larger one [J] of a level at rest, and where a segment starts: there a varying load has its present value."""
-    start = segment.modal(np.array([segment.start]))[:, 0]
-    return max(abs(segment.level.asymptotic.potential), abs(segment.level.potential(start)))
+    return max(abs(segment.level.asymptotic.potential), abs(segment.level.potential(_start(segment))))
 
 
 def _potential_terms(segment: Segment) -> float:
     """Absolute terms [J] of a level's potential where a segment starts; of a load on what hardly moves they cancel."""
-    form, start = segment.level.potential_form, np.abs(segment.modal(np.array([segment.start]))[:, 0])
-    r = len(form.squares)
-    eta, w, rows = start[:r], start[r:], np.abs(form.rows)
-    return float(0.5 * np.abs(form.squares) @ eta**2 + w @ (rows[:, :r] @ eta + 0.5 * rows[:, r:] @ w))
+    form = segment.level.potential_form
+    absolute = dataclasses.replace(
+        form,
+        constant=0.0,
+        linear=np.zeros_like(form.linear),
+        squares=np.abs(form.squares),
+        rows=np.abs(form.rows),
+        follows=form.follows[:0],
+    )
+    return absolute(np.abs(_start(segment)))
 
 
 def _ledger_of_trajectory(run: Trajectory) -> Ledger:
@@ -207,7 +217,7 @@ def missed(
     round-off of the terms of which coordinates are the sum: a level may move about an equilibrium that is far away.
     """
     complete, reach = _complete(run), _reach(segments, SMALLEST * metre)
-    blurred = max(ZERO * reach, ROUND_OFFS * np.finfo(float).eps * max(map(_coordinate_terms, segments)))
+    place_round_off = max(ZERO * reach, ROUND_OFFS * np.finfo(float).eps * max(map(_coordinate_terms, segments)))
     largest: dict[tuple[int, str], float] = {}
     checked = list(_signals(segments, run, complete))
     for segment, contact, _, signal in checked:
@@ -220,7 +230,7 @@ def missed(
         size = largest[contact, signal.of]
         lowest, at = signal.lowest(segment.end - segment.start, samples)
         unresolved = ROUND_OFFS * np.finfo(float).eps * segment.end * signal.steepness(at)
-        unresolved += signal.grain * blurred
+        unresolved += signal.grain * place_round_off
         if lowest < -(MISSED if armed else LAW) * size - unresolved:
             name = run.model.contacts[contact].name
             return f"missed: {name} at {segment.start + at:.9g} s, {lowest / size:g} of its size"
@@ -267,8 +277,8 @@ def _reach(segments: Sequence[Segment], smallest: float) -> float:
 
 def _coordinate_terms(segment: Segment) -> float:
     """Largest sum of the absolute terms of a coordinate y where a segment starts."""
-    level, start = segment.level, segment.modal(np.array([segment.start]))[:, 0]
-    terms = np.abs(level.level.vectors) @ np.abs(start) + np.abs(level.asymptotic.configuration)
+    level = segment.level
+    terms = np.abs(level.level.vectors) @ np.abs(_start(segment)) + np.abs(level.asymptotic.configuration)
     return float(np.max(terms, initial=0.0))
 
 
@@ -278,8 +288,8 @@ def _complete(run: Trajectory) -> bool:
 
 def _load(run: Trajectory, segment: Segment) -> np.ndarray:
     """Constant loads (m,); those that pull at damped rigid-body motion are a channel (excitation.py)."""
-    _, w = segment.level.split(segment.modal(np.array([segment.start])))
-    return segment.level.excitation.load(w[:, 0])
+    _, w = segment.level.split(_start(segment))
+    return segment.level.excitation.load(w)
 
 
 def _work(run: Trajectory, times: np.ndarray) -> np.ndarray:
