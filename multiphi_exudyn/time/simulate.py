@@ -133,10 +133,13 @@ def checked_end(model: MultiPhiModel, t_end: float) -> float:
 
 def run_with_warnings(run: Run) -> Trajectory:
     """Trajectory of a run with its warnings, none of them issued."""
-    modes, run = run.model.modes, started(run)
+    modes = run.model.modes
+    if run.start is not None:
+        run = started(run)
     trajectory = run.trajectory()
     sentences = warnings_of(trajectory, modes if isinstance(modes, Tolerance) else None)
-    sentences += base_warnings_of(run, trajectory.model)
+    if not trajectory.model.base.complete:
+        sentences += base_warnings_of(run, trajectory.model)
     if sentences:
         object.__setattr__(trajectory, "warnings", sentences)  # it is new: no other reference to it exists
     return trajectory
