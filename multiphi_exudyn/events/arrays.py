@@ -47,7 +47,7 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["Batch", "Buffers"]
+__all__ = ["Buffers"]
 
 # ---------------------------------------------------------------------- run record, ints
 
@@ -249,32 +249,3 @@ class Buffers:
         start = self.take(name, len(flat))
         getattr(self, name)[start : start + len(flat)] = flat
         return start
-
-    def used(self, name: str) -> int:
-        """Return the offset of the next values in the buffer ``name``."""
-        return self._used[name]
-
-
-class Batch:
-    """Values written to the buffers together, with offsets known before; nothing else may be written meanwhile."""
-
-    def __init__(self, buffers: Buffers) -> None:
-        self.buffers = buffers
-        self._parts: dict[str, list[np.ndarray]] = {"ints": [], "numbers": [], "waves": []}
-        self._ends = {name: buffers.used(name) for name in self._parts}
-
-    def put(self, name: str, values: object) -> int:
-        """Add values for the buffer ``name``, and return their offset."""
-        array, start = values if isinstance(values, np.ndarray) else np.array(values), self._ends[name]
-        self._parts[name].append(array)
-        self._ends[name] = start + array.size
-        return start
-
-    def write(self) -> None:
-        """Write all values to the buffers."""
-        for name, parts in self._parts.items():
-            if parts:
-                start, end = self.buffers.used(name), self._ends[name]
-                self.buffers.take(name, end - start)
-                place = getattr(self.buffers, name)[start:end]
-                np.concatenate(parts, axis=None, out=place, casting="unsafe")  # an empty list is one of floats

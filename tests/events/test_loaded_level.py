@@ -4,13 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from small_structures import chain, stop
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.packing.level_parts import from_base, level_parts, powers
+from multiphi_exudyn.events.packing.level_parts import channel_parts, from_base, level_numbers, powers
 from multiphi_exudyn.events.transitions.transition import Transition
 
 STOPS = (stop("m1", 0.2), stop("m4", 0.1, 30.0, "soft"), stop("m2", 0.1, 20.0, "law"))
@@ -93,4 +93,5 @@ def test_levels_of_other_histories_share_what_is_kept():
     again = alone.under(dataclasses.replace(Excitation.of(m, LOADS, 2.0), static=level.excitation.static))
     assert again.level is level.level
     assert again.entries is level.entries
-    assert level_parts(again).keys() == level_parts(level).keys()
+    assert channel_parts(again).keys() == channel_parts(level).keys()
+    assert_array_equal(level_numbers(again), level_numbers(level))

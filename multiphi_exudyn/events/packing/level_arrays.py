@@ -260,8 +260,8 @@ class LevelArrays:
     def _add(self, level: LoadedLevel) -> None:
         modal, number = level.modal, self._count
         n, free = modal.modes + int(self.ints[a.CHANNELS]), len(level.response.basis.rates)
-        kept = self._exits.of(level.states)
-        self.scratch.reserve(n, free, int(np.count_nonzero(kept)))
+        kept = self._exits.count(level.states)
+        self.scratch.reserve(n, free, kept)
         record = put_level(self.buffers, level, number, self._exits, kept)
         self._levels[level.states], self._offsets[number], self.loaded[number] = number, record, level
         self._count += 1
@@ -284,7 +284,7 @@ class LevelArrays:
         entered = self.level(after(level, element, entering_exit(exit_)))  # may replace the buffers
         target = self._loaded_in(entered)
         row = entered_row(self.levels.transition(level, target), element)
-        signal = self.buffers.put("ints", put_signal(self.buffers.put, level, row))
+        signal = put_signal(self.buffers, source, row)
         record = int(self.ints[source + a.EXITS]) + a.EXIT_INTS * exit_number
         self.ints[record + a.ENTERED] = signal
         if self.held is not None:

@@ -10,23 +10,44 @@ import numpy as np
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.events.transitions.exits import signal_parts
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 
-__all__ = ["base_parts", "from_base", "level_parts", "powers"]
+__all__ = ["base_parts", "channel_parts", "from_base", "level_numbers", "powers"]
 
 
-def level_parts(level: LoadedLevel) -> dict[int, np.ndarray]:
-    """Return motion, gaps and energies of a level."""
-    own, modal, channels, form = level.level, level.modal, level.channels, level.potential_form
-    stiffness, drive = -modal.coupling, level.asymptotic.drive[:, None]
-    stiffness.flat[:: modal.modes + 1] -= modal.squares
-    motion = [stiffness, channels.force, -modal.damping_matrix, channels.force_rate, drive]
-    parts = {
-        a.MOTION: np.concatenate(motion, axis=1),
-        a.GAPS: np.concatenate([own.gap_rows, level.gap_constants[:, None]], axis=1),
-        a.POTENTIAL: np.concatenate([[form.constant], form.linear, form.squares, form.rows.ravel()]),
-        a.FOLLOWS: form.follows,
-    }
+def level_numbers(level: LoadedLevel) -> np.ndarray:
+    """Return the numbers that describe a level, as level_writing.py takes them."""
+    own, modal, channels, form, response = (
+        level.level,
+        level.modal,
+        level.channels,
+        level.potential_form,
+        level.response,
+    )
+    highest = max(own.highest_frequency, level.excitation.highest_frequency)
+    parts = (
+        [form.constant, highest, response.basis.unit],
+        modal.squares,
+        modal.damping.diagonal() / 2,
+        level.asymptotic.drive,
+        modal.coupling,
+        channels.force,
+        modal.damping_matrix,
+        channels.force_rate,
+        form.linear,
+        form.rows,
+        form.follows,
+        signal_parts(level),
+    )
+    return np.concatenate(parts, axis=None)
+
+
+def channel_parts(level: LoadedLevel) -> dict[int, np.ndarray]:
+    """Return what only a level with channels has: work of patterns, motion of rigid stops, speeds of gaps."""
+    if level.static is None:
+        return {}
+    own, modal, channels, parts = level.level, level.modal, level.channels, dict[int, np.ndarray]()
     if level.excitation.channels:
         moved, patterns = channels.carried.T, level.excitation.patterns.T
         parts[a.PATTERNS] = np.column_stack([patterns @ own.vectors, patterns @ level.asymptotic.configuration])

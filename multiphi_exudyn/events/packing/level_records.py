@@ -2,76 +2,78 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TypeAlias
+from collections.abc import Mapping
 
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.arrays import Batch, Buffers
+from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.packing.level_parts import base_parts, level_parts, powers
+from multiphi_exudyn.events.packing.level_parts import base_parts, channel_parts, level_numbers, powers
+from multiphi_exudyn.events.packing.level_writing import project_signal, record_sizes, write_record
 from multiphi_exudyn.events.transitions.defect_forms import factor, struck_defects
 from multiphi_exudyn.events.transitions.exit_table import ExitTable
-from multiphi_exudyn.events.transitions.exits import asked_state, signal_row, signals_of
+from multiphi_exudyn.events.transitions.exits import asked_state, signal_row
 from multiphi_exudyn.events.transitions.state import Row
 from multiphi_exudyn.events.transitions.work_forms import DrivenForms, driven_forms, primitive, swings
 from multiphi_exudyn.levels.base.modal_base import ModalBase
-from multiphi_exudyn.mathematics.compiling.compiled import entry
 from multiphi_exudyn.mathematics.response import response_arrays
-from multiphi_exudyn.mathematics.response.basis_arrays import describe_basis
-from multiphi_exudyn.mathematics.response.exponentials import Exponentials
+from multiphi_exudyn.mathematics.response.basis_arrays import SIZE
+from multiphi_exudyn.mathematics.response.free_response import ModalResponse
+from multiphi_exudyn.mathematics.response.response_arrays import FREE
 from multiphi_exudyn.mechanics.elements.element import Exit, Share
 
 __all__ = ["put_base", "put_level", "put_powers", "put_signal", "put_sizes", "put_strain", "put_struck"]
 
-Put: TypeAlias = Callable[[str, object], int]  # Buffers.put, or Batch.put
-
-describe = entry(describe_basis)
-
 
 def put_base(buffers: Buffers, base: ModalBase, excitation: Excitation) -> int:
     """Write the record of the base as a level in which all contacts are open and runs start, and return it."""
-    elements, parts = int(buffers.ints[a.ELEMENTS]), base_parts(base, excitation)
-    batch = Batch(buffers)
-    slots = {
-        a.MODES: base.modes.count,
-        a.STATES: batch.put("ints", np.zeros(elements, int)),
-        **_frequencies(batch, base.modes.omega),
-        **{slot: batch.put("numbers", values) for slot, values in parts.items()},
-    }
-    record = _record(batch, slots)
-    batch.write()
+    put, omega = buffers.put, base.modes.omega
+    record = [0] * a.LEVEL_INTS
+    record[a.MODES], record[a.CARRIED], record[a.MOBILITY] = base.modes.count, -1, -1
+    record[a.STATES] = put("ints", np.zeros(int(buffers.ints[a.ELEMENTS]), int))
+    record[a.FREQUENCIES] = put("numbers", omega)
+    record[a.PERIODS] = put("numbers", np.divide(1.0, omega, out=np.zeros(len(omega)), where=omega > 0))
+    for slot, values in base_parts(base, excitation).items():
+        record[slot] = put("numbers", values)
+    record[a.SPEEDS] = record[a.GAPS]
+    return put("ints", record)
+
+
+def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTable, kept: int) -> int:
+    """Write the record of a level with a number, and of its exits, of which there are ``kept``; return the record."""
+    own, modal, response, form = level.level, level.modal, level.response, level.potential_form
+    (links, n), r, p, powers = own.gap_rows.shape, modal.modes, len(response.basis.rates), response.basis.powers
+    sizes = number, r, n - r, p, links, len(own.indices), len(exits.described), kept, len(form.follows)
+    described = [*sizes, _put_chains(buffers, response), *level.states, *own.indices]
+    maps = response.from_displacement, response.from_velocity, response.from_force, response.shapes.T
+    rates = buffers.put("waves", np.concatenate([response.basis.rates, *maps], axis=None))
+    rated = int(exits.rated or np.count_nonzero(own.force_rate_rows) > 0)
+    signals = buffers.take("waves", kept * (1 + rated) * p)
+    ints, numbers = record_sizes(len(level.states), r, n - r, p, links, kept, len(form.follows))
+    free_sizes = 3 * p * r if buffers.ints[a.PRESCRIBED] else 0
+    record, at = buffers.take("ints", ints), buffers.take("numbers", numbers + free_sizes)
+    write_record(
+        *buffers.all, np.concatenate([described, powers, response.alone, response.poles], dtype=int, casting="unsafe"),
+        level_numbers(level), exits.described, exits.shares.links, exits.shares.numbers, record, at, rates, signals,
+        rated,
+    )  # fmt: skip
+    for slot, values in channel_parts(level).items():
+        place = buffers.put("numbers", values)
+        buffers.ints[record + slot] = place
+    for turning, element, exit_ in exits.turning(level.states):
+        _put_turn(buffers, record, turning, level, element, exit_)
     return record
 
 
-def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTable, kept: np.ndarray) -> int:
-    """Write the record of a level with a number, and of its exits, those of the table that are kept (e,)."""
-    own, modal, parts = level.level, level.modal, level_parts(level)
-    batch, firsts = Batch(buffers), exits.firsts(kept)
-    put = batch.put
-    basis = _put_basis(batch, level.response.basis)
-    slots = {
-        a.NUMBER: number,
-        a.MODES: modal.modes,
-        a.STATES: put("ints", level.states),
-        a.RESPONSE: _put_response(batch, level, basis),
-        a.FREE_SIZES: put("numbers", _free_sizes(level)) if buffers.ints[a.PRESCRIBED] else -1,
-        a.STRUCK_DEFECTS: 0 if buffers.ints[a.JUDGED] else -1,
-        a.FORCE: put("numbers", level.asymptotic.drive) if level.driven else -1,
-        a.EXITS: _put_exits(batch, level, exits, kept),
-        a.EXIT_COUNT: int(firsts[-1]),
-        a.FIRST_EXITS: put("ints", firsts),
-        **_frequencies(batch, modal.omega),
-        a.HIGHEST_FREQUENCY: put("numbers", [max(own.highest_frequency, level.excitation.highest_frequency)]),
-        a.FOLLOW_COUNT: len(parts[a.FOLLOWS]),
-        **{slot: put("numbers", values) for slot, values in parts.items()},
-    }
-    record = _record(batch, slots)
-    batch.write()
-    describe(*buffers.all, basis)
-    return record
+def _put_chains(buffers: Buffers, response: ModalResponse) -> int:
+    """Write the chains of a response (response_arrays.py), and return where they begin."""
+    chains = [len(response.chains)]
+    for chain in response.chains:
+        parts = chain.mixing, chain.shapes.T, chain.pushes
+        chains += [len(chain.mixing), *(buffers.put("waves", part) for part in parts)]
+    return buffers.put("ints", chains)
 
 
 def put_powers(buffers: Buffers, record: int, level: LoadedLevel, carriers: Mapping[complex, int]) -> None:
@@ -137,80 +139,20 @@ def put_strain(buffers: Buffers, record: int, level: LoadedLevel) -> None:
     buffers.ints[record + a.STRAIN_FORM] = buffers.put("numbers", values)
 
 
-def put_signal(put: Put, level: LoadedLevel, row: Row) -> list[int]:
-    """Write a signal, and return its record."""
-    table = np.concatenate([row.position, row.rate, [row.constant]])[None, :]
-    return [int(part) for part in _put_signals(put, level, table)[0]]
+def put_signal(buffers: Buffers, record: int, row: Row) -> int:
+    """Write a signal of a level with this record, and return the signal's record."""
+    n, p = len(row.position), int(buffers.ints[buffers.ints[buffers.ints[record + a.RESPONSE] + FREE] + SIZE])
+    place = buffers.put("numbers", np.concatenate([row.position, row.rate, [row.constant]]))
+    wave = buffers.take("waves", 2 * p)
+    rated = project_signal(*buffers.all, int(buffers.ints[record + a.RESPONSE]), place, wave, n)
+    return buffers.put("ints", [place, wave, rated])
 
 
-def _put_signals(put: Put, level: LoadedLevel, table: np.ndarray) -> np.ndarray:
-    """Write signals, and return their records (e, 3) (exits.signals_of)."""
-    n, r, shapes = level.width, level.modal.modes, level.response.shapes
-    waves, moves, records = table[:, :r] @ shapes, table[:, n:-1].any(axis=1), np.empty((len(table), 3), int)
-    if moves.any():
-        waves = np.hstack([waves, table[:, n : n + r] @ shapes])
-    steps = np.arange(len(table))
-    records[:, a.ROW] = put("numbers", table) + table.shape[1] * steps
-    records[:, a.WAVE] = put("waves", waves) + waves.shape[1] * steps
-    records[:, a.RATED] = moves
-    return records
-
-
-def _record(batch: Batch, slots: dict[int, int]) -> int:
-    """Write a level's record; without others its speed rows are the gap rows."""
-    record = [0] * a.LEVEL_INTS
-    for slot, value in {a.CARRIED: -1, a.MOBILITY: -1, a.SPEEDS: slots[a.GAPS], **slots}.items():
-        record[slot] = value
-    return batch.put("ints", record)
-
-
-def _frequencies(batch: Batch, omega: np.ndarray) -> dict[int, int]:
-    """Write omega (r,) and its inverses, zero where omega is zero."""
-    periods = 1 / omega if omega.all() else np.divide(1.0, omega, out=np.zeros(len(omega)), where=omega > 0)
-    return {a.FREQUENCIES: batch.put("numbers", omega), a.PERIODS: batch.put("numbers", periods)}
-
-
-def _put_response(batch: Batch, level: LoadedLevel, basis: int) -> int:
-    """Write the record of a level's response (response_arrays.py)."""
-    response, modal, put = level.response, level.modal, batch.put
-    maps = (response.from_displacement, response.from_velocity, response.from_force, response.shapes.T)
-    reached = put("ints", response_arrays.reached_modes(maps))
-    places = [put("waves", values) for values in maps]
-    places += [put("numbers", modal.squares), put("numbers", modal.damping.diagonal() / 2)]
-    chains = [len(response.chains)]
-    for chain in response.chains:
-        parts = chain.mixing, chain.shapes.T, chain.pushes
-        chains += [len(chain.mixing), *(put("waves", part) for part in parts)]
-    places += [put("ints", response.alone), put("ints", response.poles), put("ints", chains)]
-    return put("ints", [modal.modes, basis, reached, *places])
-
-
-def _free_sizes(level: LoadedLevel) -> np.ndarray:
-    """Return |A|, |B|, |P| (3, p, r) of a level's response."""
-    response = level.response
-    return np.abs([response.from_displacement, response.from_velocity, response.from_force])
-
-
-def _put_basis(batch: Batch, basis: Exponentials) -> int:
-    """Write the record of a basis (basis_arrays.py), whose description follows."""
-    put = batch.put
-    powers, rates, scales = put("ints", basis.powers), put("waves", basis.rates), put("numbers", [basis.unit, 0, 0])
-    return put("ints", [len(basis.rates), powers, rates, scales, 0, 0])
-
-
-def _put_exits(batch: Batch, level: LoadedLevel, exits: ExitTable, kept: np.ndarray) -> int:
-    """Write the records of the exits of a level, those of the table that are kept (e,)."""
-    signals = _put_signals(batch.put, level, signals_of(level, exits.shares(kept)))
-    table = np.full((len(signals), a.EXIT_INTS), -1)
-    table[:, : a.SIGNAL], table[:, a.SIGNAL : a.ENTERED] = exits.described[kept], signals
-    for k, exit_ in exits.turning(kept):
-        table[k, a.TURN :] = _turn(batch.put, level, int(table[k, 0]), exit_)
-    return batch.put("ints", table)
-
-
-def _turn(put: Put, level: LoadedLevel, element: int, exit_: Exit) -> list[int]:
-    """Return the signal of the velocity on which an exit's requested state depends, and the two states."""
+def _put_turn(buffers: Buffers, record: int, number: int, level: LoadedLevel, element: int, exit_: Exit) -> None:
+    """Add to an exit the signal of the velocity on which its requested state depends, and the two states."""
     assert exit_.turn is not None, "only exits that turn have one"
     speed = signal_row(level, element, Exit(exit_.asked, further=(Share(exit_.turn.link, rate=1.0),)))
     asked = [asked_state(level, element, Exit(name)) for name in (exit_.turn.forward, exit_.turn.backward)]
-    return [*put_signal(put, level, speed), *asked]
+    signal = put_signal(buffers, record, speed)
+    place = int(buffers.ints[record + a.EXITS]) + number * a.EXIT_INTS
+    buffers.ints[place + a.TURN : place + a.EXIT_INTS] = [*buffers.ints[signal : signal + 3], *asked]

@@ -18,7 +18,8 @@ __all__ = ["ExitTable"]
 class ExitTable:
     """All exits of elements, in the order of the elements and of their states.
 
-    described: (e, 3) the element of each, the number of the state requested, and its firmness.
+    described: (e, 4) the element and state of each, the number of the state requested, and its firmness. shares: of
+    their signals. rated: whether a signal has a share of a link's q'.
     """
 
     def __init__(self, elements: Sequence[Element]) -> None:
@@ -28,30 +29,23 @@ class ExitTable:
             for state, element_state in enumerate(element.states)
             for exit_ in element_state.exits
         ]
-        self._numbers = np.arange(len(elements) + 1)
-        self._exits = [exit_ for _, _, exit_ in entries]
-        self._turns = [k for k, exit_ in enumerate(self._exits) if exit_.turn is not None]
-        self._states = np.array([state for _, state, _ in entries], int)
-        self._shares = ExitShares.of(link_indices(elements), [(i, exit_) for i, _, exit_ in entries])
         numbers = [{state.name: number for number, state in enumerate(element.states)} for element in elements]
-        described = [(i, numbers[i][exit_.asked], exit_.firmness) for i, _, exit_ in entries]
-        self.described = np.array(described, int).reshape(-1, 3)
+        described = [(i, state, numbers[i][exit_.asked], exit_.firmness) for i, state, exit_ in entries]
+        self.described = np.array(described, int).reshape(-1, 4)
+        self.shares = ExitShares.of(link_indices(elements), [(i, exit_) for i, _, exit_ in entries])
+        self.rated = any(share.rate for _, _, exit_ in entries for share in exit_.shares)
+        self._counts = [[len(state.exits) for state in element.states] for element in elements]
+        self._turns = any(exit_.turn is not None for _, _, exit_ in entries)
+        self._elements = elements
 
-    def of(self, states: Sequence[int]) -> np.ndarray:
-        """Return which of the exits (e,) belong to elements in these states."""
-        return np.asarray(self._states == np.array(states, int)[self.described[:, 0]])
+    def count(self, states: Sequence[int]) -> int:
+        """Return the number of exits of elements in these states."""
+        return sum(counts[state] for counts, state in zip(self._counts, states, strict=True))
 
-    def shares(self, kept: np.ndarray) -> ExitShares:
-        """Return the shares of the signals of those that are ``kept`` (e,)."""
-        return self._shares.selected(kept)
-
-    def firsts(self, kept: np.ndarray) -> np.ndarray:
-        """Return the index (c + 1,) of the first kept exit of every element; the last entry is their number."""
-        return self.described[kept, 0].searchsorted(self._numbers)
-
-    def turning(self, kept: np.ndarray) -> list[tuple[int, Exit]]:
-        """Return the kept exits whose requested state depends on a velocity, with their indices among those kept."""
+    def turning(self, states: Sequence[int]) -> list[tuple[int, int, Exit]]:
+        """Return the exits in these states whose requested state depends on a velocity: their numbers and elements."""
         if not self._turns:
             return []
-        numbers = np.cumsum(kept) - 1
-        return [(int(numbers[k]), self._exits[k]) for k in self._turns if kept[k]]
+        given = enumerate(zip(self._elements, states, strict=True))
+        exits = [(i, exit_) for i, (element, state) in given for exit_ in element.states[state].exits]
+        return [(number, i, exit_) for number, (i, exit_) in enumerate(exits) if exit_.turn is not None]

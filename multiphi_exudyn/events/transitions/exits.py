@@ -7,6 +7,7 @@ A refused exit also has the signal of the level that it would enter: that of the
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,7 +16,8 @@ import numpy as np
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import Row
 from multiphi_exudyn.events.transitions.transition import Transition
-from multiphi_exudyn.mathematics.round_off import drop_round_off, sign_of
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
+from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off, sign_of
 from multiphi_exudyn.mechanics.elements.element import ElementState, Exit
 
 __all__ = [
@@ -28,11 +30,12 @@ __all__ = [
     "force_shares",
     "return_exit",
     "rows_of",
+    "signal_parts",
     "signal_row",
     "signal_rows",
     "signal_table",
-    "signals_of",
     "state_of",
+    "write_signal",
 ]
 
 
@@ -74,7 +77,11 @@ def signal_row(level: LoadedLevel, element: int, exit_: Exit) -> Row:
 
 def signal_table(level: LoadedLevel, exits: Sequence[tuple[int, Exit]]) -> np.ndarray:
     """Return the signals s of exits of elements in a level, rows (e, 2 n + 1) of (xi, xi', 1)."""
-    return signals_of(level, ExitShares.of(level.level.base.link_indices, exits))
+    own, shares = level.level, ExitShares.of(level.level.base.link_indices, exits)
+    table = np.zeros((len(exits), 2 * level.width + 1))
+    held, parts = np.array(own.indices, int), signal_parts(level)
+    write_rows(table.ravel(), parts, held, shares.links, shares.numbers, *own.gap_rows.shape, len(held), len(exits))
+    return table
 
 
 def rows_of(table: np.ndarray) -> list[Row]:
@@ -85,80 +92,85 @@ def rows_of(table: np.ndarray) -> list[Row]:
 
 @dataclass(frozen=True)
 class ExitShares:
-    """Shares of gaps, rates and forces of links in the signals of e exits. constants: (e,).
+    """Shares of gaps, rates and forces of links in the signals of e exits, as arrays for ``write_signal``.
 
-    links, shares: (e, 3) the first link of each exit, and the shares of its q, q' and lambda. further: the exits'
-    indices, links and shares of further links.
+    links: where the shares of every exit begin, and where the last ones end (e + 1,), then the link of each share.
+    numbers: the constant of every exit (e,), then the parts that each share has of q, q' and lambda (., 3).
     """
 
-    constants: np.ndarray
     links: np.ndarray
-    shares: np.ndarray
-    further: tuple[np.ndarray, np.ndarray, np.ndarray]
+    numbers: np.ndarray
 
     @classmethod
     def of(cls, link_indices: Sequence[Sequence[int]], exits: Sequence[tuple[int, Exit]]) -> ExitShares:
         """Return the shares of exits, given with the indices of their elements."""
-        links = np.array([link_indices[element][0] for element, _ in exits], int)
-        shares = np.array([exit_.shares[0][1:] for _, exit_ in exits], float).reshape(-1, 3)
-        entries = [
-            (k, link_indices[element][share.link], *share[1:])
-            for k, (element, exit_) in enumerate(exits)
-            for share in exit_.further
-        ]
-        table = np.array(entries, float).reshape(-1, 5)
-        numbers, others = table[:, :2].astype(int).T
-        constants = np.array([exit_.constant for _, exit_ in exits], float)
-        return cls(constants, links, shares, (numbers, others, table[:, 2:]))
-
-    def selected(self, kept: np.ndarray) -> ExitShares:
-        """Return the shares of the exits that are ``kept`` (e,) alone."""
-        numbers, links, shares = self.further
-        if not len(numbers):
-            return ExitShares(self.constants[kept], self.links[kept], self.shares[kept], self.further)
-        rows, counted = kept[numbers], np.cumsum(kept) - 1
-        further = counted[numbers[rows]], links[rows], shares[rows]
-        return ExitShares(self.constants[kept], self.links[kept], self.shares[kept], further)
+        firsts = [0, *itertools.accumulate(len(exit_.shares) for _, exit_ in exits)]
+        shares = [(link_indices[element][link], parts) for element, exit_ in exits for link, *parts in exit_.shares]
+        constants = [exit_.constant for _, exit_ in exits]
+        numbers = np.array(constants + [part for _, parts in shares for part in parts], float)
+        return cls(np.array(firsts + [link for link, _ in shares], int), numbers)
 
 
-def signals_of(level: LoadedLevel, exits: ExitShares) -> np.ndarray:
-    """Return the signals s of exits in a level, rows (e, 2 n + 1) of (xi, xi', 1).
+def signal_parts(level: LoadedLevel) -> np.ndarray:
+    """Return what signals are made of: rows (l, n) and constants (l,) of gaps, rows and constants of forces (k,)."""
+    own, forces = level.level, level.asymptotic.forces
+    return np.concatenate([own.gap_rows, level.gap_constants, own.force_rows, own.force_rate_rows, forces], axis=None)
 
-    A constant that is the difference of a load and a limit is zero if it is round-off of them.
+
+@compiled
+def write_signal(
+    result: Numbers,
+    row: int,
+    parts: Numbers,
+    start: int,
+    held: Ints,
+    first_held: int,
+    exits: Ints,
+    shares: Numbers,
+    links: int,
+    n: int,
+    k: int,
+    count: int,
+    exit_: int,
+) -> None:
+    """Set the signal of an exit, a row (2 n + 1,) of (xi, xi', 1) that is zero before.
+
+    parts: ``signal_parts`` from ``start``, of l ``links``; held: the k links that hold, from ``first_held``; exits,
+    shares: ``ExitShares`` of ``count`` exits. A constant that is the difference of a load and a limit is zero if it is
+    round-off of them.
     """
-    table, sizes = _link_parts(level, exits.links, exits.shares)
-    numbers, links, shares = exits.further
-    if len(numbers):
-        added, further = _link_parts(level, links, shares)
-        np.add.at(table, numbers, added)
-        np.add.at(sizes, numbers, further)
-    table[:, -1] += exits.constants
-    sizes += np.abs(exits.constants)
-    table[:, -1] = drop_round_off(table[:, -1], sizes)
-    return table
+    constants, forces = start + links * n, start + links * (n + 1)
+    constant, size = shares[exit_], abs(shares[exit_])
+    for share in range(exits[exit_], exits[exit_ + 1]):
+        link, part = exits[count + 1 + share], count + 3 * share
+        for i in range(n):
+            result[row + i] += shares[part] * parts[start + link * n + i]
+            result[row + n + i] += shares[part + 1] * parts[start + link * n + i]
+        constant += shares[part] * parts[constants + link]
+        size += abs(shares[part] * parts[constants + link])
+        if shares[part + 2] != 0.0:
+            place = 0
+            while held[first_held + place] != link:
+                place += 1
+            for i in range(n):
+                result[row + i] += shares[part + 2] * parts[forces + place * n + i]
+                result[row + n + i] += shares[part + 2] * parts[forces + (k + place) * n + i]
+            constant += shares[part + 2] * parts[forces + 2 * k * n + place]
+            size += abs(shares[part + 2] * parts[forces + 2 * k * n + place])
+    result[row + 2 * n] = constant if abs(constant) > ZERO * size else 0.0
 
 
-def _link_parts(level: LoadedLevel, links: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the parts of links (s,) in signals by their shares (s, 3): rows (s, 2 n + 1) of (xi, xi', 1), and sizes.
+@compiled
+def write_signals(
+    result: Numbers, parts: Numbers, held: Ints, exits: Ints, shares: Numbers, links: int, n: int, k: int, count: int
+) -> None:
+    """Set the signals of all exits, rows (count, 2 n + 1)."""
+    for exit_ in range(count):
+        row = exit_ * (2 * n + 1)
+        write_signal(result, row, parts, 0, held, 0, exits, shares, links, n, k, count, exit_)
 
-    The sizes (s,) are those of the terms of which the last column is the sum.
-    """
-    own, n = level.level, level.width
-    rows, table = own.gap_rows[links], np.zeros((len(links), 2 * n + 1))
-    np.multiply(rows, shares[:, :1], out=table[:, :n])
-    if np.count_nonzero(shares[:, 1]):
-        np.multiply(rows, shares[:, 1:2], out=table[:, n:-1])
-    np.multiply(level.gap_constants[links], shares[:, 0], out=table[:, -1])
-    sizes, pressing = np.abs(table[:, -1]), shares[:, 2].nonzero()[0]
-    if len(pressing):
-        active = [own.indices.index(link) for link in links[pressing].tolist()]
-        pressed = np.concatenate(
-            [own.force_rows[active], own.force_rate_rows[active], level.asymptotic.forces[active, None]], axis=1
-        )
-        pressed *= shares[pressing, 2:]
-        table[pressing] += pressed
-        sizes[pressing] += np.abs(pressed[:, -1])
-    return table, sizes
+
+write_rows = entry(write_signals)
 
 
 def force_shares(level: LoadedLevel, element: int, exit_: Exit) -> list[tuple[int, float]]:

@@ -29,8 +29,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.response.basis_arrays import SIZE, differentiate, exponentials
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled, entry
+from multiphi_exudyn.mathematics.response.basis_arrays import (
+    BASIS,
+    POWERS,
+    RATES,
+    SCALES,
+    SIZE,
+    describe_basis,
+    differentiate,
+    exponentials,
+)
 
 __all__ = [
     "CHAIN",
@@ -49,7 +58,9 @@ __all__ = [
     "UNCOUPLED",
     "coefficients_of",
     "reached_modes",
+    "response_ints",
     "state_of",
+    "write_response",
 ]
 
 MODES, FREE, REACHED, FROM_DISPLACEMENT, FROM_VELOCITY, FROM_FORCE, SHAPES = 0, 1, 2, 3, 4, 5, 6
@@ -60,16 +71,65 @@ CHAIN = 4  # ints of a chain
 
 def reached_modes(maps: Sequence[np.ndarray]) -> np.ndarray:
     """Return first and last + 1 (p, 2) of the modes of every exponential, for which a map (p, r) is not zero."""
-    p, r = maps[0].shape
+    (p, r), waves = maps[0].shape, np.array(maps, complex).ravel()
     reached = np.zeros((p, 2), int)
-    if any(part.all() for part in maps):
-        reached[:, 1] = r
-    elif r:
-        part = np.any(maps, axis=0)
-        np.argmax(part, axis=1, out=reached[:, 0])
-        np.subtract(r, np.argmax(part[:, ::-1], axis=1), out=reached[:, 1])
-        reached[~part.any(axis=1)] = r, 0
+    find_reached(reached.ravel(), 0, waves, 0, len(maps), p, r)
     return reached
+
+
+@compiled
+def set_reached(ints: Ints, reached: int, waves: Waves, maps: int, count: int, p: int, r: int) -> None:
+    """Set REACHED of ``count`` maps (p, r), one after the other in the waves; r and 0 where all are zero."""
+    for j in range(p):
+        first, end = r, 0
+        for i in range(r):
+            for k in range(count):
+                if waves[maps + (k * p + j) * r + i] != 0j:
+                    first, end = min(first, i), i + 1
+        ints[reached + 2 * j], ints[reached + 2 * j + 1] = first, end
+
+
+find_reached = entry(set_reached)
+
+
+@compiled
+def write_response(
+    ints: Ints,
+    numbers: Numbers,
+    waves: Waves,
+    response: int,
+    squares: int,
+    half_damping: int,
+    scales: int,
+    rates: int,
+    given: Ints,
+    described: int,
+    chains: int,
+    r: int,
+    p: int,
+) -> None:
+    """Write the record of a response and of its basis, with all their ints, ``response_ints(r, p)``.
+
+    The numbers from squares, half_damping and scales on, the chains, and the waves are there: the rates, A, B, P and
+    V^T. given: d (p,), UNCOUPLED (r,) and POLES (p,), from ``described`` on.
+    """
+    basis, maps = response + RESPONSE, rates + p
+    powers, reached = basis + BASIS, basis + BASIS + 2 * p + r
+    ints[response + MODES], ints[response + FREE], ints[response + REACHED] = r, basis, reached
+    ints[response + FROM_DISPLACEMENT], ints[response + FROM_VELOCITY] = maps, maps + p * r
+    ints[response + FROM_FORCE], ints[response + SHAPES] = maps + 2 * p * r, maps + 3 * p * r
+    ints[response + SQUARES], ints[response + HALF_DAMPING] = squares, half_damping
+    ints[response + UNCOUPLED], ints[response + POLES], ints[response + CHAINS] = powers + p, powers + p + r, chains
+    ints[basis + SIZE], ints[basis + POWERS], ints[basis + RATES], ints[basis + SCALES] = p, powers, rates, scales
+    for k in range(2 * p + r):
+        ints[powers + k] = given[described + k]
+    set_reached(ints, reached, waves, maps, 4, p, r)
+    describe_basis(ints, numbers, waves, basis)
+
+
+def response_ints(r: int, p: int) -> int:
+    """Return the number of ints of a response's record."""
+    return RESPONSE + BASIS + 4 * p + r
 
 
 @compiled
