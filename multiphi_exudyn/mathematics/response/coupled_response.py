@@ -24,6 +24,7 @@ import numpy as np
 import scipy.linalg
 
 from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 from multiphi_exudyn.mathematics.response.exponentials import Exponentials
 from multiphi_exudyn.mathematics.response.free_response import Chain, ModalResponse, is_slow, slow_powers, uncoupled
 from multiphi_exudyn.mathematics.response.light_damping import lightly_damped
@@ -41,24 +42,28 @@ def modal_response(
 
     duration: of the longest motion [s]. Raises NumericalFailure where rates are not distinct by more than round-off.
     """
-    is_uncoupled = coupling is None or not coupling.any()
-    if is_uncoupled and _uncoupled(damping):
+    is_uncoupled = coupling is None or not np.count_nonzero(coupling)
+    if is_uncoupled and is_diagonal(np.ascontiguousarray(damping).ravel(), len(squares)):
         return uncoupled(squares, np.diagonal(damping), duration)
     response = lightly_damped(squares, damping) if is_uncoupled else None
     return response or _coupled(squares, np.diag(squares) + (0.0 if coupling is None else coupling), damping, duration)
 
 
-def _uncoupled(damping: np.ndarray) -> bool:
-    """Return whether the off-diagonal elements of damping (r, r) are round-off."""
-    diagonal, others = np.abs(damping.diagonal()), np.abs(damping)
-    others.flat[:: len(others) + 1] = 0.0
-    largest, coupling = diagonal.max(initial=0.0), others.max(initial=0.0)
-    if coupling > DIAGONAL * largest:
-        return False
-    if coupling <= DIAGONAL * diagonal.min(initial=math.inf):
-        return True
-    scale = np.sqrt(np.outer(diagonal, diagonal))
-    return bool((others <= DIAGONAL * np.maximum(scale, largest * DIAGONAL)).all())
+@compiled
+def has_no_coupling(damping: Numbers, r: int) -> int:
+    """Return 1 where the off-diagonal elements of damping (r, r) are round-off of its diagonal, else 0."""
+    largest = 0.0
+    for i in range(r):
+        largest = max(largest, abs(damping[i * r + i]))
+    for i in range(r):
+        for j in range(r):
+            scale = max(math.sqrt(abs(damping[i * r + i] * damping[j * r + j])), largest * DIAGONAL)
+            if i != j and abs(damping[i * r + j]) > DIAGONAL * scale:
+                return 0
+    return 1
+
+
+is_diagonal = entry(has_no_coupling)
 
 
 def _coupled(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, duration: float) -> ModalResponse:

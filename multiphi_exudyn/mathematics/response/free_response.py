@@ -112,23 +112,55 @@ def uncoupled(squares: np.ndarray, damping: np.ndarray, duration: float = math.i
 
     duration: of the longest motion [s].
     """
-    given = enumerate(zip(squares.tolist(), damping.tolist(), strict=True))
-    terms = [term for k, (square, rate) in given for term in _mode_terms(k, square, rate / 2, duration)]
-    p, r = len(terms), len(squares)
-    modes, rates, powers, weights = zip(*terms, strict=True) if terms else ((), (), (), ())
-    shapes, maps, own = np.zeros((r, p), complex), np.zeros((3, p, r), complex), np.arange(p)
-    shapes[modes, own] = 1.0
-    maps[:, own, modes] = np.array(weights, complex).reshape(p, 3).T
-    basis = Exponentials(np.array(rates, complex), np.array(powers, int))
-    alone, poles = np.ones(r, bool), np.zeros(p, bool)
-    return ModalResponse(basis, shapes, maps[0], maps[1], maps[2], diagonal=True, alone=alone, poles=poles)
+    r, delta, omega = len(squares), 0.5 * damping, np.sqrt(np.abs(squares))
+    difference = (delta - omega) * (delta + omega)
+    roots = np.sqrt(np.abs(difference))
+    oscillates = (difference < 0) & (roots > NEARLY_CRITICAL * omega)
+    further = list[Term]()
+    if not oscillates.all() or not (squares > 0).all():
+        oscillates &= squares > 0
+        for k in np.flatnonzero(~oscillates).tolist():
+            further += _mode_terms(k, float(squares[k]), float(delta[k]), duration)
+        delta, roots = delta[oscillates], roots[oscillates]
+    modes = np.concatenate([np.flatnonzero(oscillates), np.array([k for k, *_ in further], int)])
+    count, p, own = len(roots), len(modes), _numbers(len(modes))
+    waves = np.zeros((4, p, r), complex)
+    shapes, maps = waves[3], waves[:3]
+    shapes[own, modes] = 1.0
+    phases = 1j / roots
+    maps[1, own[:count], modes[:count]] = -phases
+    maps[0, own[:count], modes[:count]] = 1 - delta * phases
+    rates, powers = np.empty(p, complex), np.zeros(p, int)
+    rates.real[:count], rates.imag[:count] = -delta, roots
+    for at, (k, rate, power, weights) in enumerate(further, start=count):
+        rates[at], powers[at], maps[:, at, k] = rate, power, weights
+    return ModalResponse(
+        basis=Exponentials(rates, powers),
+        shapes=shapes.T,
+        from_displacement=maps[0],
+        from_velocity=maps[1],
+        from_force=maps[2],
+        diagonal=True,
+        alone=_flags(r, True),
+        poles=_flags(p, False),
+    )
+
+
+@functools.lru_cache(maxsize=64)
+def _numbers(count: int) -> np.ndarray:
+    return np.arange(count)
+
+
+@functools.lru_cache(maxsize=64)
+def _flags(count: int, value: bool) -> np.ndarray:
+    return np.full(count, value)
 
 
 Term = tuple[int, complex, int, tuple[complex, complex, complex]]  # mode, rate, power, weights of eta, eta', p
 
 
 def _mode_terms(k: int, square: float, delta: float, duration: float) -> list[Term]:
-    """Return the terms of one mode eta'' + 2 delta eta' + omega^2 eta = p, omega^2 = ``square``."""
+    """Return the terms of one mode that does not oscillate: eta'' + 2 delta eta' + omega^2 eta = p."""
     if square == 0.0:
         return _free_terms(k, delta, duration)
     if square < 0:
@@ -140,8 +172,6 @@ def _mode_terms(k: int, square: float, delta: float, duration: float) -> list[Te
         s = difference  # cosh, sinh(s t)/s of small s t, to t^5
         even, odd = (1.0, 0.0, s / 2, 0.0, s * s / 24, 0.0), (0.0, 1.0, 0.0, s / 6, 0.0, s * s / 120)
         return [(k, -delta, d, (e + delta * o, o, 0.0)) for d, (e, o) in enumerate(zip(even, odd, strict=True))]
-    if difference < 0:
-        return [(k, complex(-delta, root), 0, (1 - 1j * delta / root, -1j / root, 0.0))]
     fast = -(delta + root)
     slow = square / fast
     return [
