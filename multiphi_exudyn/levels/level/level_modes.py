@@ -37,7 +37,7 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.eigenproblems.modes import right_singular_vectors
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import without
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import product_error, without
 from multiphi_exudyn.mathematics.eigenproblems.secular_equation import rank_one_modes
 
 __all__ = ["level_modes"]
@@ -62,10 +62,10 @@ def level_modes(
     if not closed_directions.members:
         return base.squares[:modes].copy(), np.eye(modes or base.modes.count, base.modes.count).T, 0.0
     solution = _cheapest(base, closed_directions, modes)
-    error = _error(solution[1])
+    error = product_error(solution[1])
     if error > ORTHOGONAL:
         solution = _singular_value_modes(base, closed_directions, np.linalg.qr(solution[1])[0])
-        error = _error(solution[1])
+        error = product_error(solution[1])
     if not error <= ORTHONORMAL:
         raise NumericalFailure(
             f"level: its modes are not accurate (mass normalisation off by {error:g}); are units and magnitudes of "
@@ -87,18 +87,6 @@ def _cheapest(
     return _singular_value_modes(
         base, closed_directions, _null_space(closed_directions.vectors[:, closed_directions.rigid])
     )
-
-
-def _error(vectors: np.ndarray) -> float:
-    """Return the largest element of |Phi^T Phi - I|."""
-    products = vectors.T @ vectors
-    products -= _identity(len(products))
-    return float(np.abs(products, out=products).max(initial=0.0))
-
-
-@functools.lru_cache(maxsize=64)
-def _identity(count: int) -> np.ndarray:
-    return np.eye(count)
 
 
 def _rank_one_changes(

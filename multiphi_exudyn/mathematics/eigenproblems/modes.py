@@ -23,6 +23,8 @@ import numpy as np
 import scipy.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import scalar_product
 
 __all__ = [
     "FIRST_SHIFT",
@@ -112,35 +114,66 @@ def aligned_modes(
     these only, and so on; the omega^2 are replaced by their mean. The first row with a value in a mode has a positive
     one.
     """
-    clusters, values = _clusters(squares), rows @ shapes
-    if clusters:
-        squares, shapes = squares.copy(), shapes.copy()
-    for first, last in clusters:
+    (n, m), k = shapes.shape, len(rows)
+    modes, values, rows = np.array(shapes.T, order="C"), np.empty((k, m)), np.ascontiguousarray(rows)
+    if not set_signs(modes.ravel(), squares, rows.ravel(), sizes, values.ravel(), n, k, m, 1):
+        squares, modes = _aligned_clusters(squares, shapes, rows, sizes)
+        set_signs(modes.ravel(), squares, rows.ravel(), sizes, values.ravel(), n, k, m, 0)
+    return squares, modes.T, values
+
+
+@compiled
+def align_signs(
+    modes: Numbers, squares: Numbers, rows: Numbers, sizes: Numbers, values: Numbers, n: int, k: int, m: int, check: int
+) -> int:
+    """Make the first value of modes (m, n) in rows (k, n), then in coordinates, positive; write the values (k, m).
+
+    Where no value is clear the largest one counts. check: 1 to return 0 where modes have equal omega^2.
+    """
+    for j in range(1, m if check == 1 else 0):
+        if squares[j] - squares[j - 1] <= EQUAL * max(abs(squares[j]), abs(squares[j - 1])):
+            return 0
+    for j in range(m):
+        decided, largest, is_negative = 0, -1.0, 0
+        for i in range(k + n):
+            value = scalar_product(rows, i * n, modes, j * n, n) if i < k else modes[j * n + i - k]
+            if i < k:
+                values[i * m + j] = value
+            elif decided == 1:
+                break
+            share = abs(value) / sizes[i] if sizes[i] > 0.0 else 0.0
+            if decided == 0 and share > largest:
+                largest, is_negative = share, 1 if value < 0.0 else 0
+                decided = 1 if share > MOVES else 0
+        if is_negative == 1:
+            for i in range(n):
+                modes[j * n + i] = -modes[j * n + i]
+            for i in range(k):
+                values[i * m + j] = -values[i * m + j]
+    return 1
+
+
+set_signs = entry(align_signs)
+
+
+def _aligned_clusters(
+    squares: np.ndarray, shapes: np.ndarray, rows: np.ndarray, sizes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return omega^2 (m,), and modes (m, n) with unique bases of clusters of equal omega^2."""
+    squares, shapes, values = squares.copy(), shapes.copy(), rows @ shapes
+    for first, last in _clusters(squares):
         squares[first:last] = np.mean(squares[first:last])
         rotation = _alignment(np.vstack([values[:, first:last], shapes[:, first:last]]), sizes)
         lengths = np.linalg.norm(shapes[:, first:last], axis=1, keepdims=True)
         cluster = shapes[:, first:last] @ rotation
         shapes[:, first:last] = np.where(np.abs(cluster) <= ROTATED * lengths, 0.0, cluster)
-        values[:, first:last] = values[:, first:last] @ rotation
-    signs = _signs(values, shapes, sizes)
-    return squares, shapes * signs, values * signs
-
-
-def _signs(values: np.ndarray, shapes: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Return the sign (m,) of the first row or coordinate that has a value in each mode."""
-    if len(values) and (np.abs(values[0]) > MOVES * sizes[0]).all():
-        return np.copysign(1.0, values[0])
-    values = np.vstack([values, shapes])
-    first = _first_row(np.abs(values), sizes[: len(values), None])
-    return np.where(values[first, np.arange(values.shape[1])] >= 0, 1.0, -1.0)
+    return squares, np.ascontiguousarray(shapes.T)
 
 
 def _clusters(squares: np.ndarray) -> list[tuple[int, int]]:
     """Return the first and one past the last mode of every cluster of two or more equal omega^2, ascending."""
-    steps = enumerate(itertools.pairwise(squares.tolist()), start=1)
-    ends = [k for k, (below, above) in steps if above - below > EQUAL * max(abs(below), abs(above))]
-    if len(ends) == len(squares) - 1:
-        return []
+    apart = np.diff(squares) > EQUAL * np.maximum(np.abs(squares[1:]), np.abs(squares[:-1]))
+    ends = (np.flatnonzero(apart) + 1).tolist()
     return [(first, last) for first, last in itertools.pairwise([0, *ends, len(squares)]) if last - first > 1]
 
 
@@ -149,21 +182,19 @@ def _alignment(values: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     rotation = np.eye(values.shape[1])
     for j in range(len(rotation) - 1):
         rotated = values @ rotation[:, j:]
-        row = int(_first_row(np.linalg.norm(rotated, axis=1), sizes))
+        row = _first_row(np.linalg.norm(rotated, axis=1), sizes)
         reflector = rotated[row] / (np.linalg.norm(rotated[row]) or 1.0)  # its mode comes first
         reflector[0] += np.copysign(1.0, reflector[0])
         rotation[:, j:] -= np.outer(rotation[:, j:] @ reflector, reflector) * (2 / (reflector @ reflector))
     return rotation
 
 
-def _first_row(values: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Return the first row with a value in (k,) or in each column of (k, m), else the one of largest value."""
+def _first_row(values: np.ndarray, sizes: np.ndarray) -> int:
+    """Return the first row with a value (k,), else the one of largest value."""
     is_present = values > MOVES * sizes
-    first = is_present.argmax(axis=0)
-    if is_present.any(axis=0).all():
-        return np.asarray(first)
-    share = np.divide(values, sizes, out=np.zeros_like(values), where=sizes > 0)
-    return np.where(is_present.any(axis=0), first, share.argmax(axis=0))
+    if is_present.any():
+        return int(is_present.argmax())
+    return int(np.divide(values, sizes, out=np.zeros_like(values), where=sizes > 0).argmax())
 
 
 def _shifted_modes(mass: np.ndarray, stiffness: np.ndarray, shift: float) -> Modes | None:

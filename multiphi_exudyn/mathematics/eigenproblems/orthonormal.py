@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-__all__ = ["least_squares", "orthonormal", "without"]
+from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
+
+__all__ = ["least_squares", "orthonormal", "product_error", "scalar_product", "without"]
 
 
 def orthonormal(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -12,7 +16,7 @@ def orthonormal(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if directions.shape[1] != 1:
         q, r = np.linalg.qr(directions)
         return q, r
-    length = np.linalg.norm(directions)
+    length = math.sqrt(float(directions[:, 0] @ directions[:, 0]))
     return directions / (length or 1.0), np.array([[length]])
 
 
@@ -26,6 +30,53 @@ def least_squares(directions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 def without(directions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Return the part of vectors (m, ...) that is orthogonal to directions (m, k), column by column in memory."""
-    shares = least_squares(directions, vectors)
-    removed = np.multiply.outer(shares[0], directions[:, 0]) if len(shares) == 1 else shares.T @ directions.T
-    return np.subtract(vectors.T, removed, out=removed).T
+    result = np.array(vectors.T, dtype=float, order="C")
+    if directions.shape[1] == 1:
+        remove_from(np.ascontiguousarray(directions[:, 0]), result.ravel(), len(directions), vectors[0].size)
+    else:
+        result -= least_squares(directions, vectors).T @ directions.T
+    return result.T
+
+
+def product_error(vectors: np.ndarray) -> float:
+    """Return the largest element of |V^T V - I|, V (m, r)."""
+    return float(largest_error(np.ascontiguousarray(vectors.T).ravel(), *vectors.shape))
+
+
+@compiled
+def scalar_product(a: Numbers, first: int, b: Numbers, second: int, m: int) -> float:
+    """Return the product of two vectors (m,) in four independent sums, which a processor adds up together."""
+    sum_0, sum_1, sum_2, sum_3 = 0.0, 0.0, 0.0, 0.0
+    for i in range(0, m - 3, 4):
+        sum_0 += a[first + i] * b[second + i]
+        sum_1 += a[first + i + 1] * b[second + i + 1]
+        sum_2 += a[first + i + 2] * b[second + i + 2]
+        sum_3 += a[first + i + 3] * b[second + i + 3]
+    for i in range(m - m % 4, m):
+        sum_0 += a[first + i] * b[second + i]
+    return (sum_0 + sum_1) + (sum_2 + sum_3)
+
+
+@compiled
+def remove_direction(direction: Numbers, vectors: Numbers, m: int, count: int) -> None:
+    """Remove a direction (m,) from vectors (count, m)."""
+    square = scalar_product(direction, 0, direction, 0, m)
+    for k in range(count if square > 0.0 else 0):
+        share = scalar_product(direction, 0, vectors, k * m, m) / square
+        for i in range(m):
+            vectors[k * m + i] -= share * direction[i]
+
+
+@compiled
+def largest_product_error(vectors: Numbers, m: int, r: int) -> float:
+    """Return ``product_error`` of vectors (r, m); NaN where one is not finite."""
+    largest = 0.0
+    for i in range(r):
+        for j in range(i + 1):
+            error = abs(scalar_product(vectors, i * m, vectors, j * m, m) - (1.0 if i == j else 0.0))
+            if not error <= largest:
+                largest = error
+    return largest
+
+
+remove_from, largest_error = entry(remove_direction), entry(largest_product_error)
