@@ -27,10 +27,15 @@ class ClosedDirections:
     stiffness: np.ndarray
     offsets: np.ndarray
 
-    @property
+    @functools.cached_property
     def rigid(self) -> np.ndarray:
         """Whether each direction (d,) is rigid."""
         return np.isinf(self.stiffness)
+
+    @functools.cached_property
+    def pinned(self) -> np.ndarray:
+        """Rigid directions (m, .)."""
+        return self.vectors[:, self.rigid]
 
     @property
     def orthogonal(self) -> tuple[ClosedDirections, np.ndarray]:
@@ -38,16 +43,16 @@ class ClosedDirections:
 
         The small difference of nearly parallel directions would be lost in round-off. Q has their unit of length.
         """
-        count = int(np.count_nonzero(self.rigid))
-        return (
-            (self, np.eye(count)) if count < 2 else self._orthogonalised
-        )  # no reference to itself, which would delay its release
+        count = self.pinned.shape[1]
+        if count < 2:
+            return self, np.ones((count, count))  # not kept: a reference to itself would delay its release
+        return self._orthogonalised
 
     @functools.cached_property
     def _orthogonalised(self) -> tuple[ClosedDirections, np.ndarray]:
         """``orthogonal`` for two or more rigid directions."""
         rigid = self.rigid
-        directions = self.vectors[:, rigid]
+        directions = self.pinned
         length = float(np.max(np.linalg.norm(directions, axis=0))) or 1.0
         q, r = np.linalg.qr(directions / length)
         vectors, offsets = self.vectors.copy(), self.offsets.copy()

@@ -6,6 +6,7 @@ negative stiffness downwards; asserted when a level is built.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,6 +16,7 @@ from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.base.modal_base import INTERLACING, ModalBase
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.level.level_modes import level_modes
+from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.eigenproblems.modes import aligned_modes
 from multiphi_exudyn.mathematics.eigenproblems.orthonormal import least_squares, orthonormal
@@ -150,7 +152,7 @@ def _following(base: ModalBase, rigid: list[int]) -> np.ndarray:
         names = ", ".join(base.links[i].name for i in rigid)
         raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
     components = q.T @ units
-    almost = np.einsum("ij,ij->j", components, components) > ALMOST
+    almost = np.add.reduce(components * components) > ALMOST
     almost[rigid] = False  # no remainder beside themselves
     following[rigid] = True
     if almost.any():
@@ -177,19 +179,40 @@ def _reaction_rows(
 
     Weighted by 1 / (Omega^2 + |omega^2|), in which no mode of the base outweighs the others. spring_forces: (m, r).
     """
-    total = base.squares + np.abs(squares)[:, None]  # a row for every mode, as vectors stand in memory
-    if not total[:, 0].all():
-        smallest = np.min(np.where(total > 0, total, np.inf), axis=1, initial=np.inf, keepdims=True)
-        total = np.where(total > 0, total, np.where(np.isinf(smallest), 1.0, smallest))
-    residuals = (base.squares - squares[:, None]) * vectors.T - spring_forces.T
-    if pinned.shape[1] == 1:
-        along = pinned[:, 0]
-        weighted = along / total
-        return np.asarray(np.einsum("ij,ij->i", weighted, residuals) / (weighted @ along))[None, :]
-    roots = 1 / np.sqrt(total)
-    q, r = np.linalg.qr(roots[:, :, None] * pinned)
-    projected = np.einsum("ijk,ij->ik", q, roots * residuals)
-    return np.asarray(np.linalg.solve(r, projected[:, :, None])[:, :, 0].T)
+    (m, r), c = vectors.shape, pinned.shape[1]
+    residuals, roots = np.empty((r, m)), np.empty((r, m))
+    modes, forces = np.ascontiguousarray(vectors.T), np.ascontiguousarray(spring_forces.T)
+    weigh(base.squares, squares, modes.ravel(), forces.ravel(), residuals.ravel(), roots.ravel(), m, r)
+    directions = roots[:, :, None] * pinned
+    if c == 1:
+        along = directions[:, :, 0]
+        return (np.add.reduce(along * residuals, axis=1) / np.add.reduce(along * along, axis=1))[None, :]
+    q, triangle = np.linalg.qr(directions)
+    projected = np.einsum("ijk,ij->ik", q, residuals)
+    return np.asarray(np.linalg.solve(triangle, projected[:, :, None])[:, :, 0].T)
+
+
+@compiled
+def weigh_residuals(
+    base: Numbers, squares: Numbers, modes: Numbers, forces: Numbers, residuals: Numbers, roots: Numbers, m: int, r: int
+) -> None:
+    """Set roots of the weights and weighted residuals (r, m) of ``_reaction_rows``; base: Omega^2 (m,).
+
+    A weight of zero Omega^2 and omega^2 is the largest other one of its mode.
+    """
+    for j in range(r):
+        smallest = math.inf
+        for i in range(m):
+            total = base[i] + abs(squares[j])
+            if 0.0 < total < smallest:
+                smallest = total
+        for i in range(m):
+            total, k = base[i] + abs(squares[j]), j * m + i
+            roots[k] = 1.0 / math.sqrt(total if total > 0.0 else (smallest if smallest < math.inf else 1.0))
+            residuals[k] = roots[k] * ((base[i] - squares[j]) * modes[k] - forces[k])
+
+
+weigh = entry(weigh_residuals)
 
 
 def _check_interlacing(

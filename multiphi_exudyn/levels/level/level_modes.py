@@ -84,9 +84,7 @@ def _cheapest(
             return solution
     if modes is not None and _is_compliance_cheaper(base, closed_directions, modes):
         return _compliance_modes(base, closed_directions, modes)
-    return _singular_value_modes(
-        base, closed_directions, _null_space(closed_directions.vectors[:, closed_directions.rigid])
-    )
+    return _singular_value_modes(base, closed_directions, _null_space(closed_directions.pinned))
 
 
 def _rank_one_changes(
@@ -96,24 +94,23 @@ def _rank_one_changes(
 
     Each direction changes the modes that those before it have left, all of which are needed until the last one.
     """
-    stiffness = closed_directions.stiffness
-    sprung = np.flatnonzero(stiffness)
-    if not len(sprung) or stiffness.min() < 0 or (len(sprung) - 1) * base.modes.count**2 > CHANGES:
+    stiffness = closed_directions.stiffness.tolist()
+    sprung = [j for j, k in enumerate(stiffness) if k]
+    if not sprung or min(stiffness) < 0 or (len(sprung) - 1) * base.modes.count**2 > CHANGES:
         return None
     squares, changes = base.squares, list[np.ndarray]()
-    for place, j in enumerate(sprung.tolist()):
+    for j in sprung:
         direction = closed_directions.vectors[:, j]
         for change in changes:
             direction = direction @ change
-        rigid = math.isinf(stiffness[j])
-        count = modes if place == len(sprung) - 1 else len(squares) - rigid
-        solution = rank_one_modes(squares, direction, float(stiffness[j]), count)
+        count = modes if j == sprung[-1] else len(squares) - math.isinf(stiffness[j])
+        solution = rank_one_modes(squares, direction, stiffness[j], count)
         if solution is None:
             return None
         squares = solution[0]
         changes.append(solution[1])
     vectors = functools.reduce(lambda later, change: change @ later, reversed(changes))
-    pinned = closed_directions.vectors[:, closed_directions.rigid]
+    pinned = closed_directions.pinned
     return squares, without(pinned, vectors) if pinned.shape[1] else vectors, 0.0
 
 
