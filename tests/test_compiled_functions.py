@@ -205,8 +205,10 @@ def test_an_entry_sees_another_array_and_none_can_be_moved_under_it():
     assert run(numbers, 0) == 9.0
     assert run(np.array([4.0]), 0) == 16.0
     assert run(numbers, 0) == 9.0
+    numbers.resize(100_000, refcheck=False)  # its address is not kept yet
+    assert run(numbers, 0) == run(numbers, 0) == 9.0
     with pytest.raises(ValueError, match="cannot resize"):
-        numbers.resize(100_000, refcheck=False)
+        numbers.resize(1_000_000, refcheck=False)
 
 
 def test_an_entry_bound_to_its_buffers_takes_the_rest_and_sees_what_they_then_hold():

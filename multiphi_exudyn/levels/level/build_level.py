@@ -180,39 +180,72 @@ def _reaction_rows(
     Weighted by 1 / (Omega^2 + |omega^2|), in which no mode of the base outweighs the others. spring_forces: (m, r).
     """
     (m, r), c = vectors.shape, pinned.shape[1]
-    residuals, roots = np.empty((r, m)), np.empty((r, m))
-    modes, forces = np.ascontiguousarray(vectors.T), np.ascontiguousarray(spring_forces.T)
-    weigh(base.squares, squares, modes.ravel(), forces.ravel(), residuals.ravel(), roots.ravel(), m, r)
-    directions = roots[:, :, None] * pinned
-    if c == 1:
-        along = directions[:, :, 0]
-        return (np.add.reduce(along * residuals, axis=1) / np.add.reduce(along * along, axis=1))[None, :]
-    q, triangle = np.linalg.qr(directions)
-    projected = np.einsum("ijk,ij->ik", q, residuals)
-    return np.asarray(np.linalg.solve(triangle, projected[:, :, None])[:, :, 0].T)
+    reactions, scratch = np.empty((c, r)), np.empty((c + 2) * m + c * (c + 1))
+    modes, forces = np.ascontiguousarray(vectors.T).ravel(), np.ascontiguousarray(spring_forces.T).ravel()
+    directions = np.ascontiguousarray(pinned.T).ravel()
+    set_reactions(base.squares, squares, modes, forces, directions, reactions.ravel(), scratch, m, r, c)
+    return reactions
 
 
 @compiled
-def weigh_residuals(
-    base: Numbers, squares: Numbers, modes: Numbers, forces: Numbers, residuals: Numbers, roots: Numbers, m: int, r: int
+def write_reactions(
+    base: Numbers,
+    squares: Numbers,
+    modes: Numbers,
+    forces: Numbers,
+    pinned: Numbers,
+    reactions: Numbers,
+    scratch: Numbers,
+    m: int,
+    r: int,
+    c: int,
 ) -> None:
-    """Set roots of the weights and weighted residuals (r, m) of ``_reaction_rows``; base: Omega^2 (m,).
+    """Set ``_reaction_rows`` (c, r); base: Omega^2 (m,), modes, forces: (r, m), pinned: (c, m).
 
-    A weight of zero Omega^2 and omega^2 is the largest other one of its mode.
+    By Gram-Schmidt orthogonalisation, in the weighted product. scratch: (c + 2) m + c (c + 1) numbers. A weight of zero
+    Omega^2 and omega^2 is the largest other one of its mode.
     """
+    weights, residual, columns, triangle = 0, m, 2 * m, (2 + c) * m
     for j in range(r):
-        smallest = math.inf
+        square, smallest = abs(squares[j]), math.inf
         for i in range(m):
-            total = base[i] + abs(squares[j])
-            if 0.0 < total < smallest:
-                smallest = total
+            if 0.0 < base[i] + square < smallest:
+                smallest = base[i] + square
         for i in range(m):
-            total, k = base[i] + abs(squares[j]), j * m + i
-            roots[k] = 1.0 / math.sqrt(total if total > 0.0 else (smallest if smallest < math.inf else 1.0))
-            residuals[k] = roots[k] * ((base[i] - squares[j]) * modes[k] - forces[k])
+            total = base[i] + square
+            scratch[weights + i] = 1.0 / (total if total > 0.0 else (smallest if smallest < math.inf else 1.0))
+            scratch[residual + i] = (base[i] - squares[j]) * modes[j * m + i] - forces[j * m + i]
+        for k in range(c * m):
+            scratch[columns + k] = pinned[k]
+        for k in range(c):
+            column, row = columns + k * m, triangle + k * (c + 1)
+            length = weighted_product(scratch, weights, column, column, m)
+            for p in range(k + 1, c + 1):
+                other = columns + p * m if p < c else residual
+                scratch[row + p] = weighted_product(scratch, weights, column, other, m) / length
+                for i in range(m):
+                    scratch[other + i] -= scratch[row + p] * scratch[column + i]
+        for k in range(c - 1, -1, -1):
+            row = triangle + k * (c + 1)
+            value = scratch[row + c]
+            for p in range(k + 1, c):
+                value -= scratch[row + p] * reactions[p * r + j]
+            reactions[k * r + j] = value
 
 
-weigh = entry(weigh_residuals)
+@compiled
+def weighted_product(numbers: Numbers, weights: int, a: int, b: int, m: int) -> float:
+    """Return the sum of w a b over m elements, in two independent sums, which a processor adds up together."""
+    even, odd = 0.0, 0.0
+    for i in range(0, m - 1, 2):
+        even += numbers[weights + i] * numbers[a + i] * numbers[b + i]
+        odd += numbers[weights + i + 1] * numbers[a + i + 1] * numbers[b + i + 1]
+    if m % 2 == 1:
+        even += numbers[weights + m - 1] * numbers[a + m - 1] * numbers[b + m - 1]
+    return even + odd
+
+
+set_reactions = entry(write_reactions)
 
 
 def _check_interlacing(

@@ -168,7 +168,7 @@ def _compile(functions: Sequence[FunctionType]) -> list[bytes]:
 
 
 class _Buffer:
-    """Argument type of a buffer for ctypes: the address of its first number, cached for the last array.
+    """Argument type of a buffer for ctypes: the address of its first number, cached for an array that comes twice.
 
     That array may be deleted meanwhile, but not moved: NumPy does not resize an array with a weak reference in place.
     """
@@ -176,21 +176,23 @@ class _Buffer:
     def __init__(self, dtype: np.dtype) -> None:
         self._dtype = dtype
         self._last: tuple[Callable[[], Any], ctypes.c_void_p] = (lambda: self, ctypes.c_void_p())
+        self._seen = 0
 
-    def from_param(self, array: np.ndarray) -> ctypes.c_void_p:
+    def from_param(self, array: np.ndarray) -> Any:
         """Return the address of an array."""
         last, address = self._last
         return address if last() is array else self._address(array)
 
-    def _address(self, array: np.ndarray) -> ctypes.c_void_p:
+    def _address(self, array: np.ndarray) -> Any:
         if not (isinstance(array, np.ndarray) and array.dtype == self._dtype and array.flags.carray):
             got = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
             raise MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}")
-        address = ctypes.c_void_p(_address_of(array))
+        if not array.size:
+            return ctypes.c_void_p(array.ctypes.data)
+        first = ctypes.c_char.from_buffer(array)
+        if self._seen != id(array):
+            self._seen = id(array)
+            return ctypes.byref(first)
+        address = ctypes.c_void_p(ctypes.addressof(first))
         self._last = (weakref.ref(array), address)
         return address
-
-
-def _address_of(array: np.ndarray) -> int:
-    """Return the address of the first number of an array, faster than NumPy does."""
-    return ctypes.addressof(ctypes.c_char.from_buffer(array.data)) if array.size else array.ctypes.data

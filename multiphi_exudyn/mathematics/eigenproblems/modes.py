@@ -24,7 +24,6 @@ import scipy.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import scalar_product
 
 __all__ = [
     "FIRST_SHIFT",
@@ -114,19 +113,19 @@ def aligned_modes(
     these only, and so on; the omega^2 are replaced by their mean. The first row with a value in a mode has a positive
     one.
     """
-    (n, m), k = shapes.shape, len(rows)
-    modes, values, rows = np.array(shapes.T, order="C"), np.empty((k, m)), np.ascontiguousarray(rows)
-    if not set_signs(modes.ravel(), squares, rows.ravel(), sizes, values.ravel(), n, k, m, 1):
-        squares, modes = _aligned_clusters(squares, shapes, rows, sizes)
-        set_signs(modes.ravel(), squares, rows.ravel(), sizes, values.ravel(), n, k, m, 0)
+    modes, values = np.array(shapes.T, order="C"), rows @ shapes
+    if not set_signs(modes.ravel(), squares, sizes, values.ravel(), *shapes.shape, len(rows), 1):
+        squares, modes = _aligned_clusters(squares, shapes, values, sizes)
+        values = rows @ modes.T
+        set_signs(modes.ravel(), squares, sizes, values.ravel(), *shapes.shape, len(rows), 0)
     return squares, modes.T, values
 
 
 @compiled
 def align_signs(
-    modes: Numbers, squares: Numbers, rows: Numbers, sizes: Numbers, values: Numbers, n: int, k: int, m: int, check: int
+    modes: Numbers, squares: Numbers, sizes: Numbers, values: Numbers, n: int, m: int, k: int, check: int
 ) -> int:
-    """Make the first value of modes (m, n) in rows (k, n), then in coordinates, positive; write the values (k, m).
+    """Make the first value of modes (m, n) in rows, values (k, m), then in the coordinates themselves, positive.
 
     Where no value is clear the largest one counts. check: 1 to return 0 where modes have equal omega^2.
     """
@@ -134,17 +133,14 @@ def align_signs(
         if squares[j] - squares[j - 1] <= EQUAL * max(abs(squares[j]), abs(squares[j - 1])):
             return 0
     for j in range(m):
-        decided, largest, is_negative = 0, -1.0, 0
+        largest, is_negative = -1.0, 0
         for i in range(k + n):
-            value = scalar_product(rows, i * n, modes, j * n, n) if i < k else modes[j * n + i - k]
-            if i < k:
-                values[i * m + j] = value
-            elif decided == 1:
-                break
+            value = values[i * m + j] if i < k else modes[j * n + i - k]
             share = abs(value) / sizes[i] if sizes[i] > 0.0 else 0.0
-            if decided == 0 and share > largest:
+            if share > largest:
                 largest, is_negative = share, 1 if value < 0.0 else 0
-                decided = 1 if share > MOVES else 0
+            if share > MOVES:
+                break
         if is_negative == 1:
             for i in range(n):
                 modes[j * n + i] = -modes[j * n + i]
@@ -157,10 +153,10 @@ set_signs = entry(align_signs)
 
 
 def _aligned_clusters(
-    squares: np.ndarray, shapes: np.ndarray, rows: np.ndarray, sizes: np.ndarray
+    squares: np.ndarray, shapes: np.ndarray, values: np.ndarray, sizes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return omega^2 (m,), and modes (m, n) with unique bases of clusters of equal omega^2."""
-    squares, shapes, values = squares.copy(), shapes.copy(), rows @ shapes
+    """Return omega^2 (m,), and modes (m, n) with unique bases of clusters of equal omega^2; values: (k, m) of rows."""
+    squares, shapes = squares.copy(), shapes.copy()
     for first, last in _clusters(squares):
         squares[first:last] = np.mean(squares[first:last])
         rotation = _alignment(np.vstack([values[:, first:last], shapes[:, first:last]]), sizes)
