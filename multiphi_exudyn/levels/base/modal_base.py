@@ -111,6 +111,11 @@ class ModalBase(ElementTable, Shown):
         return rows, np.concatenate([np.linalg.norm(rows, axis=1), np.ones(self.modes.count)])
 
     @functools.cached_property
+    def level_numbers(self) -> np.ndarray:
+        """The sizes of ``observed_rows``, ``lengths``, both ``square_bounds`` and ``squares``, one after the other."""
+        return np.concatenate([self.observed_rows[1], self.lengths, *self.square_bounds, self.squares])
+
+    @functools.cached_property
     def direction_indices(self) -> list[int]:
         """For every link the index of the first link with the same direction up to its sign."""
         return parallel(self.directions)

@@ -1,26 +1,20 @@
-"""Building a level: its modes, and the rows by which gaps and contact forces follow from them.
-
-Each direction of positive stiffness added interlaces: omega_i(open) <= omega_i(level) <= omega_i+c(open), one of
-negative stiffness downwards; asserted when a level is built.
-"""
+"""Building a level: its modes, and the rows by which gaps and contact forces follow from them."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
-from multiphi_exudyn.levels.base.modal_base import INTERLACING, ModalBase
+from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.level.level_modes import level_modes
-from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
+from multiphi_exudyn.levels.level.level_rows import level_rows
 from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
-from multiphi_exudyn.mathematics.eigenproblems.modes import aligned_modes
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import least_squares, orthonormal
-from multiphi_exudyn.mathematics.round_off import drop_round_off
+from multiphi_exudyn.mathematics.eigenproblems.modes import aligned_clusters
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import orthonormal
 
 __all__ = ["build_level", "independent"]
 
@@ -41,93 +35,62 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
         squares[np.argsort(np.abs(squares), kind="stable")[:rigid_body]] = 0.0
     if accuracy:
         squares[np.abs(squares) <= NEUTRAL * accuracy] = 0.0
-    squares, vectors, row_values = _aligned(base, squares, vectors, closed)
-    _check_interlacing(base, squares, closed_directions, accuracy)
-    gap_rows = drop_round_off(
-        row_values[: len(base.links)], base.lengths[:, None]
-    )  # every component of a mode has some
-    if following.any():
-        gap_rows[following] = 0.0  # exactly, whatever round-off a soft mode leaves
-    damped = base.damped(vectors, closed)
-    forces, rates = _force_rows(base, closed, squares, vectors, damped, gap_rows[closed])
+    if not (is_vibrating := bool(squares.all())):
+        squares, vectors = _aligned_free_modes(base, squares, vectors, closed)
+    stiffnesses = closed_directions.stiffness.tolist()
+    rows = level_rows(base, closed, stiffnesses, squares, vectors, following, accuracy, check=is_vibrating)
+    if rows is None:
+        squares, vectors = aligned_clusters(squares, vectors, *base.observed_rows)
+        rows = level_rows(base, closed, stiffnesses, squares, vectors, following, accuracy, check=False)
+    assert rows is not None, "it is one only where clusters are checked"
     zero = squares == 0
+    if not is_vibrating:
+        _drop_damping_of_free_modes(base, closed, zero, rows.damping)
     return Level(
         closed=tuple(base.links[i].name for i in closed if i not in base.laws),
         indices=indices,
         base=base,
         squares=squares,
-        vectors=vectors,
-        damping=_projected_damping(base, closed, zero, vectors, damped),
-        gap_rows=gap_rows,
+        vectors=rows.vectors,
+        damping=rows.damping,
+        gap_rows=rows.gaps,
         following=following,
-        speed_rows=gap_rows,
-        force_rows=forces,
-        force_rate_rows=rates,
-        neutral=vectors[:, zero] if np.count_nonzero(zero) > rigid_body else vectors[:, :0],
+        speed_rows=rows.gaps,
+        force_rows=rows.forces,
+        force_rate_rows=rows.force_rates,
+        neutral=rows.vectors[:, zero] if np.count_nonzero(zero) > rigid_body else rows.vectors[:, :0],
         computed=squares,
         kept_beyond=0,
     )
 
 
-def _aligned(
+def _aligned_free_modes(
     base: ModalBase, squares: np.ndarray, vectors: np.ndarray, closed: Sequence[int]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return omega^2 and modes of a level, and the displacements (k, r) of contacts and points in each mode.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return omega^2 and modes with unique bases of equal omega^2, among which are zero-frequency modes.
 
-    Signs, and the modes within a cluster of one frequency, are chosen by contacts, then points, then the modes of the
-    base. Undamped zero-frequency modes come first: they drift for ever, damped ones come to rest.
+    They are chosen by contacts, then points, then the modes of the base. Undamped zero-frequency modes come first: they
+    drift for ever, damped ones come to rest.
     """
     rows, sizes = base.observed_rows
-    if squares.all():
-        return aligned_modes(squares, vectors, rows, sizes)
     free = np.flatnonzero(squares == 0)
-    squares, vectors, row_values = squares.copy(), vectors.copy(), np.empty((len(rows), len(squares)))
+    squares, vectors = squares.copy(), vectors.copy()
     rates, rotation = np.linalg.eigh(vectors[:, free].T @ base.damped(vectors[:, free], closed))
     drifting = int(np.sum(rates <= UNDAMPED * base.largest_damping(closed)))
     if 0 < drifting < len(free):
         vectors[:, free] = vectors[:, free] @ rotation
     for part in (free[:drifting], free[drifting:], np.flatnonzero(squares)):
-        squares[part], vectors[:, part], row_values[:, part] = aligned_modes(
-            squares[part], vectors[:, part], rows, sizes
-        )
-    return squares, vectors, row_values
+        squares[part], vectors[:, part] = aligned_clusters(squares[part], vectors[:, part], rows, sizes)
+    return squares, vectors
 
 
-def _force_rows(
-    base: ModalBase,
-    closed: list[int],
-    squares: np.ndarray,
-    vectors: np.ndarray,
-    damped: np.ndarray,
-    gap_rows: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows (k, r) that give the forces of closed contacts from eta, and those from eta'.
+def _drop_damping_of_free_modes(base: ModalBase, closed: Sequence[int], free: np.ndarray, damping: np.ndarray) -> None:
+    """Put zeros in place of round-off in the damping matrix (r, r) of zero-frequency modes, ``free`` (r,).
 
-    gap_rows: (k, r) of the closed contacts.
+    Round-off would damp a mode that has no other damping.
     """
-    rigid = [base.links[i].rigid for i in closed]
-    forces, rates = base.restoring[:, closed, None] * gap_rows
-    if any(rigid):
-        directions = base.directions[:, closed]
-        pinned = directions[:, rigid]
-        forces[rigid] = _reaction_rows(base, pinned, squares, vectors, directions @ forces)
-        rates[rigid] = least_squares(pinned, damped)
-    return forces, rates
-
-
-def _projected_damping(
-    base: ModalBase, closed: Sequence[int], free: np.ndarray, vectors: np.ndarray, damped: np.ndarray
-) -> np.ndarray:
-    """Return the modal damping matrix D (r, r), with zeros in place of round-off on zero-frequency modes.
-
-    Round-off would damp a mode that has no other damping. free: (r,) bool, zero frequency. damped: C_l Phi_l.
-    """
-    projected: np.ndarray = vectors.T @ damped
-    if not free.any():
-        return projected
-    negligible = np.abs(projected) <= UNDAMPED * base.largest_damping(closed)
-    projected[negligible & (free[:, None] | free[None, :])] = 0.0
-    return projected
+    negligible = np.abs(damping) <= UNDAMPED * base.largest_damping(closed)
+    damping[negligible & (free[:, None] | free[None, :])] = 0.0
 
 
 def independent(base: ModalBase, rigid: Sequence[int]) -> bool:
@@ -170,96 +133,3 @@ def _rigid_body_modes(base: ModalBase, closed_directions: ClosedDirections) -> i
         return base.modes.rigid
     singular = np.linalg.svd(rigid, compute_uv=False)
     return base.modes.rigid - int(np.sum(singular > INDEPENDENT * closed_directions.size))
-
-
-def _reaction_rows(
-    base: ModalBase, pinned: np.ndarray, squares: np.ndarray, vectors: np.ndarray, spring_forces: np.ndarray
-) -> np.ndarray:
-    """Return the reactions (c, r) of every mode: (Omega^2 - omega^2) psi - (force of the springs) = H_r rho.
-
-    Weighted by 1 / (Omega^2 + |omega^2|), in which no mode of the base outweighs the others. spring_forces: (m, r).
-    """
-    (m, r), c = vectors.shape, pinned.shape[1]
-    reactions, scratch = np.empty((c, r)), np.empty((c + 2) * m + c * (c + 1))
-    modes, forces = np.ascontiguousarray(vectors.T).ravel(), np.ascontiguousarray(spring_forces.T).ravel()
-    directions = np.ascontiguousarray(pinned.T).ravel()
-    set_reactions(base.squares, squares, modes, forces, directions, reactions.ravel(), scratch, m, r, c)
-    return reactions
-
-
-@compiled
-def write_reactions(
-    base: Numbers,
-    squares: Numbers,
-    modes: Numbers,
-    forces: Numbers,
-    pinned: Numbers,
-    reactions: Numbers,
-    scratch: Numbers,
-    m: int,
-    r: int,
-    c: int,
-) -> None:
-    """Set ``_reaction_rows`` (c, r); base: Omega^2 (m,), modes, forces: (r, m), pinned: (c, m).
-
-    By Gram-Schmidt orthogonalisation, in the weighted product. scratch: (c + 2) m + c (c + 1) numbers. A weight of zero
-    Omega^2 and omega^2 is the largest other one of its mode.
-    """
-    weights, residual, columns, triangle = 0, m, 2 * m, (2 + c) * m
-    for j in range(r):
-        square, smallest = abs(squares[j]), math.inf
-        for i in range(m):
-            if 0.0 < base[i] + square < smallest:
-                smallest = base[i] + square
-        for i in range(m):
-            total = base[i] + square
-            scratch[weights + i] = 1.0 / (total if total > 0.0 else (smallest if smallest < math.inf else 1.0))
-            scratch[residual + i] = (base[i] - squares[j]) * modes[j * m + i] - forces[j * m + i]
-        for k in range(c * m):
-            scratch[columns + k] = pinned[k]
-        for k in range(c):
-            column, row = columns + k * m, triangle + k * (c + 1)
-            length = weighted_product(scratch, weights, column, column, m)
-            for p in range(k + 1, c + 1):
-                other = columns + p * m if p < c else residual
-                scratch[row + p] = weighted_product(scratch, weights, column, other, m) / length
-                for i in range(m):
-                    scratch[other + i] -= scratch[row + p] * scratch[column + i]
-        for k in range(c - 1, -1, -1):
-            row = triangle + k * (c + 1)
-            value = scratch[row + c]
-            for p in range(k + 1, c):
-                value -= scratch[row + p] * reactions[p * r + j]
-            reactions[k * r + j] = value
-
-
-@compiled
-def weighted_product(numbers: Numbers, weights: int, a: int, b: int, m: int) -> float:
-    """Return the sum of w a b over m elements, in two independent sums, which a processor adds up together."""
-    even, odd = 0.0, 0.0
-    for i in range(0, m - 1, 2):
-        even += numbers[weights + i] * numbers[a + i] * numbers[b + i]
-        odd += numbers[weights + i + 1] * numbers[a + i + 1] * numbers[b + i + 1]
-    if m % 2 == 1:
-        even += numbers[weights + m - 1] * numbers[a + m - 1] * numbers[b + m - 1]
-    return even + odd
-
-
-set_reactions = entry(write_reactions)
-
-
-def _check_interlacing(
-    base: ModalBase, squares: np.ndarray, closed_directions: ClosedDirections, accuracy: float
-) -> None:
-    """Raise NumericalFailure for omega^2 (r,) that violate the interlacing theorem of the module's docstring."""
-    stiffness, slack = closed_directions.stiffness.tolist(), INTERLACING * accuracy
-    stiffening, softening = sum(k > 0 for k in stiffness), sum(k < 0 for k in stiffness)
-    below, above = base.square_bounds
-    below, above = below[: len(squares) - softening], above[stiffening : len(squares) + stiffening]
-    if slack:
-        below, above = below - slack, above + slack
-    if not ((squares[softening:] >= below).all() and (squares[: len(above)] <= above).all()):
-        raise NumericalFailure(
-            "level: its modes are not accurate (interlacing violated); are units and magnitudes of mass and stiffness "
-            "right?"
-        )

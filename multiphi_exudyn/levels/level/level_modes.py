@@ -109,6 +109,8 @@ def _rank_one_changes(
             return None
         squares = solution[0]
         changes.append(solution[1])
+    if len(changes) == 1:
+        return squares, changes[0], 0.0
     vectors = functools.reduce(lambda later, change: change @ later, reversed(changes))
     pinned = closed_directions.pinned
     return squares, without(pinned, vectors) if pinned.shape[1] else vectors, 0.0

@@ -189,7 +189,7 @@ class _Buffer:
             raise MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}")
         if not array.size:
             return ctypes.c_void_p(array.ctypes.data)
-        first = ctypes.c_char.from_buffer(array)
+        first = ctypes.c_char.from_buffer(array.data)
         if self._seen != id(array):
             self._seen = id(array)
             return ctypes.byref(first)

@@ -30,8 +30,11 @@ __all__ = [
     "NEAR",
     "ROUND_OFF",
     "Modes",
+    "align_signs",
+    "aligned_clusters",
     "aligned_modes",
     "complete_modes",
+    "has_clusters",
     "largest_ratio",
     "modes_from_squares",
     "right_singular_vectors",
@@ -113,57 +116,63 @@ def aligned_modes(
     these only, and so on; the omega^2 are replaced by their mean. The first row with a value in a mode has a positive
     one.
     """
+    squares, shapes = aligned_clusters(squares, shapes, rows, sizes)
     modes, values = np.array(shapes.T, order="C"), rows @ shapes
-    if not set_signs(modes.ravel(), squares, sizes, values.ravel(), *shapes.shape, len(rows), 1):
-        squares, modes = _aligned_clusters(squares, shapes, values, sizes)
-        values = rows @ modes.T
-        set_signs(modes.ravel(), squares, sizes, values.ravel(), *shapes.shape, len(rows), 0)
+    set_signs(modes.ravel(), sizes, values.ravel(), 0, np.empty(len(modes)), 0, *shapes.shape, len(rows))
     return squares, modes.T, values
 
 
-@compiled
-def align_signs(
-    modes: Numbers, squares: Numbers, sizes: Numbers, values: Numbers, n: int, m: int, k: int, check: int
-) -> int:
-    """Make the first value of modes (m, n) in rows, values (k, m), then in the coordinates themselves, positive.
-
-    Where no value is clear the largest one counts. check: 1 to return 0 where modes have equal omega^2.
-    """
-    for j in range(1, m if check == 1 else 0):
-        if squares[j] - squares[j - 1] <= EQUAL * max(abs(squares[j]), abs(squares[j - 1])):
-            return 0
-    for j in range(m):
-        largest, is_negative = -1.0, 0
-        for i in range(k + n):
-            value = values[i * m + j] if i < k else modes[j * n + i - k]
-            share = abs(value) / sizes[i] if sizes[i] > 0.0 else 0.0
-            if share > largest:
-                largest, is_negative = share, 1 if value < 0.0 else 0
-            if share > MOVES:
-                break
-        if is_negative == 1:
-            for i in range(n):
-                modes[j * n + i] = -modes[j * n + i]
-            for i in range(k):
-                values[i * m + j] = -values[i * m + j]
-    return 1
-
-
-set_signs = entry(align_signs)
-
-
-def _aligned_clusters(
-    squares: np.ndarray, shapes: np.ndarray, values: np.ndarray, sizes: np.ndarray
+def aligned_clusters(
+    squares: np.ndarray, shapes: np.ndarray, rows: np.ndarray, sizes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return omega^2 (m,), and modes (m, n) with unique bases of clusters of equal omega^2; values: (k, m) of rows."""
-    squares, shapes = squares.copy(), shapes.copy()
-    for first, last in _clusters(squares):
+    """Return omega^2 and modes of ``aligned_modes``, with unique bases of clusters and any signs."""
+    clusters = _clusters(squares)
+    if not clusters:
+        return squares, shapes
+    squares, shapes, values = squares.copy(), shapes.copy(), rows @ shapes
+    for first, last in clusters:
         squares[first:last] = np.mean(squares[first:last])
         rotation = _alignment(np.vstack([values[:, first:last], shapes[:, first:last]]), sizes)
         lengths = np.linalg.norm(shapes[:, first:last], axis=1, keepdims=True)
         cluster = shapes[:, first:last] @ rotation
         shapes[:, first:last] = np.where(np.abs(cluster) <= ROTATED * lengths, 0.0, cluster)
-    return squares, np.ascontiguousarray(shapes.T)
+    return squares, shapes
+
+
+@compiled
+def has_clusters(squares: Numbers, m: int) -> int:
+    """Return 1 where two of ascending omega^2 (m,) are equal, else 0."""
+    for j in range(1, m):
+        if squares[j] - squares[j - 1] <= EQUAL * max(abs(squares[j]), abs(squares[j - 1])):
+            return 1
+    return 0
+
+
+@compiled
+def align_signs(
+    modes: Numbers, sizes: Numbers, values: Numbers, at: int, signs: Numbers, signs_at: int, n: int, m: int, k: int
+) -> None:
+    """Make the first value of modes (m, n) in rows, then in the coordinates themselves, positive; write the signs (m,).
+
+    values: (k, m) from ``at`` on, of the rows. Where no value is clear the largest one counts.
+    """
+    for j in range(m):
+        largest, sign = -1.0, 1.0
+        for i in range(k + n):
+            value = values[at + i * m + j] if i < k else modes[j * n + i - k]
+            share = abs(value) / sizes[i] if sizes[i] > 0.0 else 0.0
+            if share > largest:
+                largest, sign = share, -1.0 if value < 0.0 else 1.0
+            if share > MOVES:
+                break
+        signs[signs_at + j] = sign
+        for i in range(n if sign < 0.0 else 0):
+            modes[j * n + i] = -modes[j * n + i]
+        for i in range(k if sign < 0.0 else 0):
+            values[at + i * m + j] = -values[at + i * m + j]
+
+
+set_signs = entry(align_signs)
 
 
 def _clusters(squares: np.ndarray) -> list[tuple[int, int]]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 
-__all__ = ["least_squares", "orthonormal", "product_error", "scalar_product", "without"]
+__all__ = ["least_squares", "orthonormal", "product_error", "remove_direction", "scalar_product", "without"]
 
 
 def orthonormal(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -32,7 +32,7 @@ def without(directions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Return the part of vectors (m, ...) that is orthogonal to directions (m, k), column by column in memory."""
     result = np.array(vectors.T, dtype=float, order="C")
     if directions.shape[1] == 1:
-        remove_from(np.ascontiguousarray(directions[:, 0]), result.ravel(), len(directions), vectors[0].size)
+        remove_from(np.ascontiguousarray(directions[:, 0]), 0, result.ravel(), 0, len(directions), vectors[0].size)
     else:
         result -= least_squares(directions, vectors).T @ directions.T
     return result.T
@@ -58,13 +58,14 @@ def scalar_product(a: Numbers, first: int, b: Numbers, second: int, m: int) -> f
 
 
 @compiled
-def remove_direction(direction: Numbers, vectors: Numbers, m: int, count: int) -> None:
-    """Remove a direction (m,) from vectors (count, m)."""
-    square = scalar_product(direction, 0, direction, 0, m)
+def remove_direction(direction: Numbers, first: int, vectors: Numbers, start: int, m: int, count: int) -> None:
+    """Remove a direction (m,), which begins at ``first``, from vectors (count, m), which begin at ``start``."""
+    square = scalar_product(direction, first, direction, first, m)
     for k in range(count if square > 0.0 else 0):
-        share = scalar_product(direction, 0, vectors, k * m, m) / square
+        vector = start + k * m
+        share = scalar_product(direction, first, vectors, vector, m) / square
         for i in range(m):
-            vectors[k * m + i] -= share * direction[i]
+            vectors[vector + i] -= share * direction[first + i]
 
 
 @compiled

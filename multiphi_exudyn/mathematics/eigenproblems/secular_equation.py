@@ -22,6 +22,7 @@ import math
 import numpy as np
 
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import remove_direction
 
 __all__ = ["rank_one_modes"]
 
@@ -138,7 +139,8 @@ def needs_no_deflation(numbers: Numbers, m: int, count: int) -> int:
 def roots(numbers: Numbers, m: int, count: int, compliance: float, check_deflation: int) -> int:
     """Return 1 if all roots converge. numbers: d, p (m,), sums, then roots (count,) and vectors (count, m).
 
-    compliance: 1 / k. check_deflation: 1 to return DEFLATED where a d has to be deflated.
+    compliance: 1 / k; vectors of a constraint are made orthogonal to p once more. check_deflation: 1 to return DEFLATED
+    where a d has to be deflated.
     """
     if check_deflation == 1 and needs_no_deflation(numbers, m, count) == 0:
         return DEFLATED
@@ -165,6 +167,8 @@ def roots(numbers: Numbers, m: int, count: int, compliance: float, check_deflati
             numbers[vector + j] *= scale
         for j in range(near, m):
             numbers[vector + j] = scale * numbers[m + j] / (numbers[j] - numbers[nearer] - distance)
+    if compliance == 0.0:
+        remove_direction(numbers, m, numbers, results + count, m, count)
     return 1
 
 
