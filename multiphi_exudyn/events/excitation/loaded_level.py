@@ -20,9 +20,7 @@ from multiphi_exudyn.events.excitation.channels import Channels
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.level.level import Asymptotic, Level
-from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING
 from multiphi_exudyn.mathematics.response.free_response import ModalResponse
-from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
 
 __all__ = ["LoadedLevel", "PotentialForm", "StrainForm"]
 
@@ -114,12 +112,7 @@ class LoadedLevel(Shown):
         excitation: of this load alone, None to make one. lasting: the longest duration [s] of a motion.
         """
         equilibrium = level.asymptotic(load)
-        magnitudes, initial = level.base.magnitudes
-        terms = initial + np.abs(equilibrium.configuration) @ magnitudes
-        if level.following.any():
-            terms[level.following] *= FOLLOWING / ZERO
-        gaps = drop_round_off(equilibrium.gaps, terms)
-        constant = excitation or Excitation.constant(load, len(gaps))
+        gaps, constant = equilibrium.gaps, excitation or Excitation.constant(load, len(equilibrium.gaps))
         return cls(level, equilibrium, gaps, constant, Channels.none(level), own_states=states, lasting=lasting)
 
     def under(self, excitation: Excitation) -> LoadedLevel:
@@ -252,7 +245,7 @@ class LoadedLevel(Shown):
         y, r, q, static = equilibrium.configuration, self.modal.modes, patterns.shape[1], self.excitation.static
         modal = -self.alone.asymptotic.drive
         if base.general:
-            modal += equilibrium.load - self.modal.vectors.T @ static  # constant forces of elements
+            modal += self.modal.vectors.T @ (equilibrium.load - static)  # constant forces of elements
         constant = equilibrium.strain + self.stored - float(static @ y)
         if not q:
             return PotentialForm(constant, modal, self.modal.squares, np.zeros((0, r)), self.follows)

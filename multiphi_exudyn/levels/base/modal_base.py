@@ -116,6 +116,11 @@ class ModalBase(ElementTable, Shown):
         return np.concatenate([self.observed_rows[1], self.lengths, *self.square_bounds, self.squares])
 
     @functools.cached_property
+    def link_numbers(self) -> np.ndarray:
+        """The directions (l, m) and the gaps (l,), one after the other."""
+        return np.concatenate([self.directions.T, self.gaps], axis=None)
+
+    @functools.cached_property
     def direction_indices(self) -> list[int]:
         """For every link the index of the first link with the same direction up to its sign."""
         return parallel(self.directions)

@@ -26,7 +26,12 @@ from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.level.level_override import LevelOverride
 from multiphi_exudyn.levels.level.mode_figure import mode_figure
-from multiphi_exudyn.levels.level.static_response import Asymptotic, response_of_neutral_level, static_response
+from multiphi_exudyn.levels.level.static_response import (
+    Asymptotic,
+    gaps_at_equilibrium,
+    response_of_neutral_level,
+    static_response,
+)
 from multiphi_exudyn.mathematics.eigenproblems.modes import NEAR
 from multiphi_exudyn.mathematics.response.coupled_response import modal_response
 from multiphi_exudyn.mathematics.response.free_response import ModalResponse, is_slow
@@ -120,6 +125,11 @@ class Level(Shown):
         return len(self.squares)
 
     @functools.cached_property
+    def vibrates(self) -> bool:
+        """Whether no mode has zero frequency."""
+        return bool(self.squares.all())
+
+    @functools.cached_property
     def omega(self) -> np.ndarray:
         """Rates (r,) [rad/s] of oscillation, or of growth where ``squares`` is negative."""
         return np.sqrt(np.abs(self.squares))
@@ -201,7 +211,7 @@ class Level(Shown):
     def response_within(self, duration: float) -> ModalResponse:
         """Return the closed form of motions of at most ``duration`` [s], also with slowly damped rigid-body modes."""
         rates = self.response.basis.rates
-        if self.squares.all() or not np.any((rates != 0) & is_slow(rates, duration)):
+        if self.vibrates or not np.any((rates != 0) & is_slow(rates, duration)):
             return self.response
         return modal_response(self.squares, self.damping_matrix, self.coupling, duration)
 
@@ -276,18 +286,14 @@ class Level(Shown):
         base, index = self.base, list(self.indices)
         closed_directions = base.closed_at(self.indices)
         along, configuration, unbalanced = self._response(closed_directions, load + base.preload)
-        gaps = base.gaps_at(configuration, base.gaps)
-        strain = base.strain(configuration, index, gaps)
+        gaps = gaps_at_equilibrium(base, configuration, self.following)
         return Asymptotic(
             configuration=configuration,
             gaps=gaps,
             forces=base.contact_forces(closed_directions, along, gaps)[index],
-            drive=np.zeros(self.modes)
-            if self.squares.all()
-            else np.where(self.squares, 0.0, self.vectors.T @ unbalanced),
-            load=self.vectors.T @ load,
-            strain=strain,
-            potential=strain - float(load @ configuration),
+            drive=np.zeros(self.modes) if self.vibrates else np.where(self.squares, 0.0, self.vectors.T @ unbalanced),
+            load=load,
+            strain=base.strain(configuration, index, gaps),
         )
 
     def static_response(self, load: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -306,6 +312,6 @@ class Level(Shown):
         if self.neutral.size:
             return response_of_neutral_level(self.base, closed_directions, self.neutral, total, self.closed)
         along, configuration = static_response(self.base, closed_directions, total)
-        if self.squares.all():
+        if self.vibrates:
             return along, configuration, total
         return along, configuration, total + closed_directions.vectors @ along

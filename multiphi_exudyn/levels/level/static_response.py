@@ -19,10 +19,10 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
-from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
+from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING, INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
 
-__all__ = ["Asymptotic", "response_of_neutral_level", "static_response"]
+__all__ = ["Asymptotic", "gaps_at_equilibrium", "response_of_neutral_level", "static_response"]
 
 NONE = np.zeros((0, 0))  # rigid-body motions of a structure that has none
 
@@ -31,9 +31,9 @@ NONE = np.zeros((0, 0))  # rigid-body motions of a structure that has none
 class Asymptotic:
     """Static response of a level to gaps and static loads, x_inf of eq. (38.4).
 
-    configuration: y_inf (m,). gaps: of all links at y_inf (l,) [m]. forces: lambda_inf of the closed contacts (k,) [N].
-    drive: modal force (r,) on the zero-frequency modes, zero on the others. load: modal force Phi_l^T f (r,) of the
-    static load. strain, potential: strain energy of y_inf [J], and the same minus f.y_inf.
+    configuration: y_inf (m,). gaps: of all links at y_inf (l,) [m], zero where they are round-off. forces: lambda_inf
+    of the closed contacts (k,) [N]. drive: modal force (r,) on the zero-frequency modes, zero on the others. load: f
+    (m,). strain: strain energy of y_inf [J].
     """
 
     configuration: np.ndarray
@@ -42,7 +42,11 @@ class Asymptotic:
     drive: np.ndarray
     load: np.ndarray
     strain: float
-    potential: float
+
+    @property
+    def potential(self) -> float:
+        """Strain energy of y_inf less f.y_inf [J]."""
+        return self.strain - float(self.load @ self.configuration)
 
 
 def static_response(
@@ -95,6 +99,29 @@ def single_direction_response(
 
 
 single_response = entry(single_direction_response)
+
+
+def gaps_at_equilibrium(base: ModalBase, configuration: np.ndarray, following: np.ndarray) -> np.ndarray:
+    """Return the gaps (l,) at y (m,), with zeros in place of round-off; following (l,): gaps that others determine."""
+    gaps = np.array(following, float)
+    write_gaps(base.link_numbers, np.ascontiguousarray(configuration), gaps, len(configuration), len(gaps))
+    return gaps
+
+
+@compiled
+def write_clear_gaps(links: Numbers, y: Numbers, gaps: Numbers, m: int, count: int) -> None:
+    """Replace flags of links that follow others by gaps; links: directions (count, m), then gaps at y = 0 (count,)."""
+    for k in range(count):
+        gap = links[count * m + k]
+        size = abs(gap)
+        for i in range(m):
+            gap += links[k * m + i] * y[i]
+            size += abs(links[k * m + i] * y[i])
+        tolerance = FOLLOWING if gaps[k] == 1.0 else ZERO
+        gaps[k] = gap if abs(gap) > tolerance * size else 0.0
+
+
+write_gaps = entry(write_clear_gaps)
 
 
 def response_of_neutral_level(
