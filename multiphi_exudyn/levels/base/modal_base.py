@@ -112,8 +112,15 @@ class ModalBase(ElementTable, Shown):
 
     @functools.cached_property
     def level_numbers(self) -> np.ndarray:
-        """The sizes of ``observed_rows``, ``lengths``, both ``square_bounds`` and ``squares``, one after the other."""
-        return np.concatenate([self.observed_rows[1], self.lengths, *self.square_bounds, self.squares])
+        """What rows of a level depend on, one after the other (level_rows.py).
+
+        Sizes of ``observed_rows`` (k + m,), ``lengths`` (l,), ``square_bounds`` (2, m), ``squares`` (m,), ``restoring``
+        (2, l), whether links are rigid (l,), and ``observed_rows`` (k, m), those of links first.
+        """
+        rows, sizes = self.observed_rows
+        rigid = [link.rigid for link in self.links]
+        parts = sizes, self.lengths, *self.square_bounds, self.squares, self.restoring, rigid, rows
+        return np.concatenate(parts, axis=None)
 
     @functools.cached_property
     def link_numbers(self) -> np.ndarray:

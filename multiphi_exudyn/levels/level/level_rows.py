@@ -18,7 +18,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.modal_base import INTERLACING, ModalBase
-from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.eigenproblems.modes import align_signs, has_clusters
 from multiphi_exudyn.mathematics.round_off import ZERO
 
@@ -54,44 +54,41 @@ def level_rows(
     stiffnesses: of all closed directions. following: links (l,) whose gaps are constant. accuracy: mu, which limits
     that of omega^2. Raises NumericalFailure for omega^2 that violate the interlacing theorem.
     """
-    observed, (m, r), links, k = base.observed_rows[0], vectors.shape, len(base.links), len(closed)
-    rigid = [base.links[i].rigid for i in closed]
-    c = sum(rigid)
-    numbers = np.empty(r * (m + len(observed) + r + 2 * k))
-    at_values = r * m
-    at_damping = at_values + r * len(observed)
-    at_forces = at_damping + r * r
-    modes, values = numbers[:at_values].reshape(r, m), numbers[at_values:at_damping].reshape(len(observed), r)
-    damping, damped = numbers[at_damping:at_forces].reshape(r, r), base.damped(vectors, closed)
-    forces = numbers[at_forces:].reshape(2, k, r)
-    modes[:] = vectors.T
-    np.matmul(observed, vectors, out=values)
-    np.matmul(modes, damped, out=damping)
-    directions, restoring = base.directions.T[closed], base.restoring[:, closed]
-    scratch = np.empty(r + (SCRATCH + c) * m + c * (c + 1))
-    work = np.concatenate([damped.T, directions, restoring, closed, rigid, following, scratch], axis=None)
+    (m, r), links, k = vectors.shape, len(base.links), len(closed)
+    c = sum(base.links[i].rigid for i in closed)
+    numbers, modes = np.empty(r * (links + r + 2 * k)), np.array(vectors.T, order="C")
+    values, damping = numbers[: r * links].reshape(links, r), numbers[r * links : r * (links + r)].reshape(r, r)
+    np.matmul(base.directions.T, vectors, out=values)
+    damped = np.array(base.damped(vectors, closed).T, order="C")
+    np.matmul(modes, damped.T, out=damping)
+    scratch = np.empty(r + (SCRATCH + c) * m + c * (c + 1) + links)
+    scratch[len(scratch) - links :] = following
     stiffening, softening = sum(each > 0 for each in stiffnesses), sum(each < 0 for each in stiffnesses)
     outcome = write_level(
-        base.level_numbers, squares, numbers, work, m, r, len(observed), links, k, c, stiffening, softening,
-        INTERLACING * accuracy, int(check),
+        base.level_numbers, squares, modes.ravel(), damped.ravel(), numbers, np.array(closed, int), scratch,
+        m, r, len(base.points), links, k, c, stiffening, softening, INTERLACING * accuracy, int(check),
     )  # fmt: skip
     if outcome == VIOLATED:
         raise NumericalFailure(
             "level: its modes are not accurate (interlacing violated); are units and magnitudes of mass and stiffness "
             "right?"
         )
-    return LevelRows(modes.T, damping, values[:links], *forces) if outcome == DONE else None
+    forces = numbers[r * (links + r) :].reshape(2, k, r)
+    return LevelRows(modes.T, damping, values, forces[0], forces[1]) if outcome == DONE else None
 
 
 @compiled
 def write_rows(
     base: Numbers,
     squares: Numbers,
+    modes: Numbers,
+    damped: Numbers,
     numbers: Numbers,
-    work: Numbers,
+    closed: Ints,
+    scratch: Numbers,
     m: int,
     r: int,
-    observed: int,
+    points: int,
     links: int,
     k: int,
     c: int,
@@ -100,32 +97,33 @@ def write_rows(
     slack: float,
     check: int,
 ) -> int:
-    """Make the signs of modes unique, and write all rows; return whether this is DONE, or why not.
+    """Make the signs of modes (r, m) unique, and write all rows; return whether this is DONE, or why not.
 
-    base: ``ModalBase.level_numbers``. numbers: modes (r, m), values of observed rows (observed, r), D (r, r), forces
-    (2, k, r). work: C_l psi (r, m); of closed links directions (k, m), forces for a unit gap and a unit gap velocity
-    (2, k), their numbers and whether they are rigid (k,), as c of them are; whether gaps are constant (l,); scratch.
+    base: ``ModalBase.level_numbers``. damped: C_l psi (r, m). numbers: gaps (l, r), D (r, r), forces (2, k, r), the
+    first two for modes of any sign. closed: numbers of the k closed links, of which c are rigid. scratch: signs (r,),
+    memory, and at the end flags of links whose gaps are constant.
     """
-    values, damping, given = m * r, (m + observed) * r, (r + k) * m
-    following, lengths, below = given + 4 * k, observed + m, observed + m + links
-    signs = following + links
+    observed, damping = links + points, r * links
+    lengths, below = observed + m, observed + m + links
+    rows, following = below + 3 * m + 3 * links, r + (SCRATCH + c) * m + c * (c + 1)
     if check == 1 and has_clusters(squares, r) == 1:
         return CLUSTERED
-    align_signs(numbers, base, numbers, values, work, signs, m, r, observed)
+    align_signs(modes, base, numbers, base, rows, scratch, m, r, links, points)
     if not interlaces(base, squares, below, m, r, stiffening, softening, slack):
         return VIOLATED
     for i in range(r):
         for j in range(r):
-            numbers[damping + i * r + j] *= work[signs + i] * work[signs + j]
-        for j in range(m):
-            work[i * m + j] *= work[signs + i]
+            numbers[damping + i * r + j] *= scratch[i] * scratch[j]
+        for j in range(m if scratch[i] < 0.0 else 0):
+            damped[i * m + j] = -damped[i * m + j]
     for i in range(links):
         for j in range(r):
-            if abs(numbers[values + i * r + j]) <= ZERO * base[lengths + i] or work[following + i] == 1.0:
-                numbers[values + i * r + j] = 0.0
-    write_spring_forces(numbers, work, values, damping + r * r, given, r, k)
+            if abs(numbers[i * r + j]) <= ZERO * base[lengths + i] or scratch[following + i] == 1.0:
+                numbers[i * r + j] = 0.0
+    write_spring_forces(base, numbers, closed, below + 3 * m, damping + r * r, r, links, k)
     if c > 0:
-        write_reactions(base, squares, numbers, work, below + 2 * m, damping + r * r, signs + r, m, r, k, c)
+        write_reactions(base, squares, modes, damped, numbers, closed, scratch, below + 2 * m, damping + r * r, m, r,
+                        links, k, c)  # fmt: skip
     return DONE
 
 
@@ -144,26 +142,31 @@ def interlaces(
 
 
 @compiled
-def write_spring_forces(numbers: Numbers, work: Numbers, values: int, forces: int, given: int, r: int, k: int) -> None:
+def write_spring_forces(
+    base: Numbers, numbers: Numbers, closed: Ints, restoring: int, forces: int, r: int, links: int, k: int
+) -> None:
     """Write the forces of closed links due to their gaps and gap velocities; springs of rigid ones have none."""
     for p in range(k):
-        gap = values + int(work[given + 2 * k + p]) * r
+        link = closed[p]
         for j in range(r):
-            numbers[forces + p * r + j] = work[given + p] * numbers[gap + j]
-            numbers[forces + (k + p) * r + j] = work[given + k + p] * numbers[gap + j]
+            numbers[forces + p * r + j] = base[restoring + link] * numbers[link * r + j]
+            numbers[forces + (k + p) * r + j] = base[restoring + links + link] * numbers[link * r + j]
 
 
 @compiled
 def write_reactions(
     base: Numbers,
     squares: Numbers,
+    modes: Numbers,
+    damped: Numbers,
     numbers: Numbers,
-    work: Numbers,
+    closed: Ints,
+    scratch: Numbers,
     omega_squares: int,
     forces: int,
-    scratch: int,
     m: int,
     r: int,
+    links: int,
     k: int,
     c: int,
 ) -> None:
@@ -171,7 +174,7 @@ def write_reactions(
 
     A weight of zero Omega^2 and omega^2 is the largest other one of its mode.
     """
-    directions, is_rigid, residual = r * m, (r + k) * m + 3 * k, scratch + m
+    is_rigid, weights, residual = omega_squares + m + 2 * links, r, r + m
     for j in range(r):
         square, smallest = abs(squares[j]), math.inf
         for i in range(m):
@@ -180,58 +183,61 @@ def write_reactions(
                 smallest = total
         for i in range(m):
             total = base[omega_squares + i] + square
-            work[scratch + i] = 1.0 / (total if total > 0.0 else (smallest if smallest < math.inf else 1.0))
-            work[residual + i] = (base[omega_squares + i] - squares[j]) * numbers[j * m + i]
+            scratch[weights + i] = 1.0 / (total if total > 0.0 else (smallest if smallest < math.inf else 1.0))
+            scratch[residual + i] = (base[omega_squares + i] - squares[j]) * modes[j * m + i]
         for p in range(k):
-            force = numbers[forces + p * r + j]
+            force, direction = numbers[forces + p * r + j], is_rigid + links + closed[p] * m
             for i in range(m if force != 0.0 else 0):
-                work[residual + i] -= work[directions + p * m + i] * force
-        fit(numbers, work, forces + j, scratch, directions, is_rigid, m, r, k, c)
+                scratch[residual + i] -= base[direction + i] * force
+        fit(base, numbers, closed, scratch, forces + j, is_rigid, m, r, links, k, c)
         for i in range(m):
-            work[scratch + i] = 1.0
-            work[residual + i] = work[j * m + i]
-        fit(numbers, work, forces + k * r + j, scratch, directions, is_rigid, m, r, k, c)
+            scratch[weights + i] = 1.0
+            scratch[residual + i] = damped[j * m + i]
+        fit(base, numbers, closed, scratch, forces + k * r + j, is_rigid, m, r, links, k, c)
 
 
 @compiled
 def fit(
+    base: Numbers,
     numbers: Numbers,
-    work: Numbers,
+    closed: Ints,
+    scratch: Numbers,
     result: int,
-    scratch: int,
-    directions: int,
     is_rigid: int,
     m: int,
     r: int,
+    links: int,
     k: int,
     c: int,
 ) -> None:
     """Set the coefficients of rigid directions that fit a residual best, at ``result`` in steps of r.
 
-    By Gram-Schmidt orthogonalisation in the weighted product. scratch: weights and residual (m,), columns (c, m), and a
-    triangle (c, c + 1).
+    By Gram-Schmidt orthogonalisation in the weighted product. scratch, after r numbers: weights and residual (m,),
+    memory for columns (c, m) and a triangle (c, c + 1).
     """
-    residual, columns, triangle, q = scratch + m, scratch + 2 * m, scratch + (2 + c) * m, 0
+    residual, columns, triangle, q = r + m, r + 2 * m, r + (2 + c) * m, 0
     for p in range(k):
-        if work[is_rigid + p] == 1.0:
+        if base[is_rigid + closed[p]] == 1.0:
             for i in range(m):
-                work[columns + q * m + i] = work[directions + p * m + i]
+                scratch[columns + q * m + i] = base[is_rigid + links + closed[p] * m + i]
             q += 1
     for p in range(c):
         column, row = columns + p * m, triangle + p * (c + 1)
-        square = weighted_product(work, scratch, column, column, m)
+        square = weighted_product(scratch, r, column, column, m)
         for q in range(p + 1, c + 1):
             other = columns + q * m if q < c else residual
-            work[row + q] = weighted_product(work, scratch, column, other, m) / square
+            scratch[row + q] = weighted_product(scratch, r, column, other, m) / square
             for i in range(m if p + 1 < c else 0):
-                work[other + i] -= work[row + q] * work[column + i]
+                scratch[other + i] -= scratch[row + q] * scratch[column + i]
     for p in range(c - 1, -1, -1):
         for q in range(p + 1, c):
-            work[triangle + p * (c + 1) + c] -= work[triangle + p * (c + 1) + q] * work[triangle + q * (c + 1) + c]
+            scratch[triangle + p * (c + 1) + c] -= (
+                scratch[triangle + p * (c + 1) + q] * scratch[triangle + q * (c + 1) + c]
+            )
     q = 0
     for p in range(k):
-        if work[is_rigid + p] == 1.0:
-            numbers[result + p * r] = work[triangle + q * (c + 1) + c]
+        if base[is_rigid + closed[p]] == 1.0:
+            numbers[result + p * r] = scratch[triangle + q * (c + 1) + c]
             q += 1
 
 

@@ -24,6 +24,7 @@ import scipy.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import scalar_product
 
 __all__ = [
     "FIRST_SHIFT",
@@ -118,7 +119,9 @@ def aligned_modes(
     """
     squares, shapes = aligned_clusters(squares, shapes, rows, sizes)
     modes, values = np.array(shapes.T, order="C"), rows @ shapes
-    set_signs(modes.ravel(), sizes, values.ravel(), 0, np.empty(len(modes)), 0, *shapes.shape, len(rows))
+    set_signs(
+        modes.ravel(), sizes, values.ravel(), values.ravel(), 0, np.empty(len(modes)), *shapes.shape, len(rows), 0
+    )
     return squares, modes.T, values
 
 
@@ -150,26 +153,41 @@ def has_clusters(squares: Numbers, m: int) -> int:
 
 @compiled
 def align_signs(
-    modes: Numbers, sizes: Numbers, values: Numbers, at: int, signs: Numbers, signs_at: int, n: int, m: int, k: int
+    modes: Numbers,
+    sizes: Numbers,
+    values: Numbers,
+    rows: Numbers,
+    start: int,
+    signs: Numbers,
+    n: int,
+    m: int,
+    k: int,
+    further: int,
 ) -> None:
     """Make the first value of modes (m, n) in rows, then in the coordinates themselves, positive; write the signs (m,).
 
-    values: (k, m) from ``at`` on, of the rows. Where no value is clear the largest one counts.
+    values: (k, m), of the first rows. rows: these and ``further`` ones, (., n) from ``start`` on. Where no value is
+    clear the largest one counts.
     """
     for j in range(m):
         largest, sign = -1.0, 1.0
-        for i in range(k + n):
-            value = values[at + i * m + j] if i < k else modes[j * n + i - k]
+        for i in range(k + further + n):
+            if i < k:
+                value = values[i * m + j]
+            elif i < k + further:
+                value = scalar_product(rows, start + i * n, modes, j * n, n)
+            else:
+                value = modes[j * n + i - k - further]
             share = abs(value) / sizes[i] if sizes[i] > 0.0 else 0.0
             if share > largest:
                 largest, sign = share, -1.0 if value < 0.0 else 1.0
             if share > MOVES:
                 break
-        signs[signs_at + j] = sign
+        signs[j] = sign
         for i in range(n if sign < 0.0 else 0):
             modes[j * n + i] = -modes[j * n + i]
         for i in range(k if sign < 0.0 else 0):
-            values[at + i * m + j] = -values[at + i * m + j]
+            values[i * m + j] = -values[i * m + j]
 
 
 set_signs = entry(align_signs)
