@@ -18,10 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn.mathematics.compiling.compiled import Numbers, Waves, compiled, entry
 from multiphi_exudyn.mathematics.response.exponentials import Exponentials
 from multiphi_exudyn.mathematics.round_off import SLOW
 
-__all__ = ["Chain", "ModalResponse", "is_slow", "slow_powers", "uncoupled"]
+__all__ = ["Chain", "ModalResponse", "flags", "is_slow", "slow_powers", "uncoupled"]
 
 NEARLY_CRITICAL = 1e-2  # |zeta^2 - 1|^(1/2) below which the Taylor polynomial of degree 5 is more accurate
 LAST_POWER = 1e-17  # of the first: powers of time below this, in the speed of slow motion, are truncated
@@ -112,47 +113,59 @@ def uncoupled(squares: np.ndarray, damping: np.ndarray, duration: float = math.i
 
     duration: of the longest motion [s].
     """
-    r, delta, omega = len(squares), 0.5 * damping, np.sqrt(np.abs(squares))
-    difference = (delta - omega) * (delta + omega)
-    roots = np.sqrt(np.abs(difference))
-    oscillates = (difference < 0) & (roots > NEARLY_CRITICAL * omega)
-    further = list[Term]()
-    if not oscillates.all() or not (squares > 0).all():
-        oscillates &= squares > 0
+    r, further = len(squares), list[Term]()
+    numbers, waves = np.concatenate([squares, 0.5 * damping, np.zeros(r)]), np.zeros((1 + 4 * r, r), complex)
+    rates, powers, maps = waves[0], np.zeros(r, int), waves[1:].reshape(4, r, r)
+    if write_oscillations(numbers, waves.ravel(), r) < r:
+        oscillates = numbers[2 * r :] == 1.0
         for k in np.flatnonzero(~oscillates).tolist():
-            further += _mode_terms(k, float(squares[k]), float(delta[k]), duration)
-        delta, roots = delta[oscillates], roots[oscillates]
-    modes = np.concatenate([np.flatnonzero(oscillates), np.array([k for k, *_ in further], int)])
-    count, p, own = len(roots), len(modes), _numbers(len(modes))
-    waves = np.zeros((4, p, r), complex)
-    shapes, maps = waves[3], waves[:3]
-    shapes[own, modes] = 1.0
-    phases = 1j / roots
-    maps[1, own[:count], modes[:count]] = -phases
-    maps[0, own[:count], modes[:count]] = 1 - delta * phases
-    rates, powers = np.empty(p, complex), np.zeros(p, int)
-    rates.real[:count], rates.imag[:count] = -delta, roots
-    for at, (k, rate, power, weights) in enumerate(further, start=count):
-        rates[at], powers[at], maps[:, at, k] = rate, power, weights
+            further += _mode_terms(k, float(squares[k]), float(damping[k]) / 2, duration)
+        count = int(np.count_nonzero(oscillates))
+        maps = np.concatenate([maps[:, oscillates], np.zeros((4, len(further), r))], axis=1)
+        rates = np.concatenate([rates[oscillates], [rate for _, rate, _, _ in further]])
+        powers = np.array([0] * count + [power for _, _, power, _ in further], int)
+        for at, (k, _, _, weights) in enumerate(further, start=count):
+            maps[:, at, k] = *weights, 1.0
     return ModalResponse(
         basis=Exponentials(rates, powers),
-        shapes=shapes.T,
+        shapes=maps[3].T,
         from_displacement=maps[0],
         from_velocity=maps[1],
         from_force=maps[2],
         diagonal=True,
-        alone=_flags(r, True),
-        poles=_flags(p, False),
+        alone=flags(r, True),
+        poles=flags(len(rates), False),
     )
 
 
-@functools.lru_cache(maxsize=64)
-def _numbers(count: int) -> np.ndarray:
-    return np.arange(count)
+@compiled
+def oscillations(numbers: Numbers, waves: Waves, r: int) -> int:
+    """Write rates, A, B, P and V^T of the modes that oscillate, each in its place, and mark them; return how many do.
+
+    numbers: omega^2, delta and marks (r,). waves: rates (r,) and matrices (4, r, r), zero before.
+    """
+    count = 0
+    for k in range(r):
+        delta, omega = numbers[r + k], math.sqrt(abs(numbers[k]))
+        difference = (delta - omega) * (delta + omega)
+        root = math.sqrt(abs(difference))
+        if numbers[k] > 0.0 and difference < 0.0 and root > NEARLY_CRITICAL * omega:
+            place, size = r + k * (r + 1), r * r
+            waves[k] = complex(-delta, root)
+            waves[place] = complex(1.0, -delta / root)
+            waves[place + size] = complex(0.0, -1.0 / root)
+            waves[place + 3 * size] = 1.0 + 0j
+            numbers[2 * r + k] = 1.0
+            count += 1
+    return count
+
+
+write_oscillations = entry(oscillations)
 
 
 @functools.lru_cache(maxsize=64)
-def _flags(count: int, value: bool) -> np.ndarray:
+def flags(count: int, value: bool) -> np.ndarray:
+    """Return ``count`` equal flags, the same array each time."""
     return np.full(count, value)
 
 

@@ -17,14 +17,13 @@ problem, SIAM Rev. 43 (2001) 235, sec. 3):
 
 from __future__ import annotations
 
-import functools
 import math
 
 import numpy as np
 
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, Waves, compiled, entry
 from multiphi_exudyn.mathematics.response.exponentials import Exponentials
-from multiphi_exudyn.mathematics.response.free_response import ModalResponse
+from multiphi_exudyn.mathematics.response.free_response import ModalResponse, flags
 
 __all__ = ["lightly_damped"]
 
@@ -56,23 +55,16 @@ def _response(numbers: np.ndarray, r: int) -> ModalResponse:
     """Return the closed form from converged vectors."""
     waves = np.zeros((1 + 4 * r, r), complex)
     write_response(numbers, waves.ravel(), r)
-    nothing, every, powers = _flags(r)
     return ModalResponse(
-        basis=Exponentials(waves[0], powers),
+        basis=Exponentials(waves[0], np.zeros(r, int)),
         shapes=waves[1 : 1 + r].T,
         from_displacement=waves[1 + r : 1 + 2 * r],
         from_velocity=waves[1 + 2 * r : 1 + 3 * r],
         from_force=waves[1 + 3 * r :],
         diagonal=False,
-        alone=nothing,
-        poles=every,
+        alone=flags(r, False),
+        poles=flags(r, True),
     )
-
-
-@functools.lru_cache(maxsize=64)
-def _flags(r: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of coupled modes: that none is alone, that every exponential is a pole, and that none has a power of time."""
-    return np.zeros(r, bool), np.ones(r, bool), np.zeros(r, int)
 
 
 @compiled
