@@ -60,10 +60,9 @@ def defect_form(transition: Transition, stopped: tuple[int, ...]) -> DefectForm:
     key = before.states, stopped
     if key not in after.entries:
         base, held = after.level.base, held_rigidly(after)
-        displaced = allowed(base, held, _motion(transition, transition.matrix))
-        moved, as_displaced = displaced, transition.velocity_matrix is transition.matrix and held.issuperset(stopped)
-        if not as_displaced:
-            moved = allowed(base, held | set(stopped), _motion(transition, transition.velocity_matrix))
+        displaced = moved = _motion(transition, transition.matrix, held)
+        if transition.velocity_matrix is not transition.matrix or not held.issuperset(stopped):
+            moved = allowed(base, held | set(stopped), _motion(transition, transition.velocity_matrix, held))
         rates = factor(over_omega(base, moved[:, 1:]))
         places = (
             factor(displaced) if transition.source.excitation.channels else _factor_beside(displaced, after.level.modes)
@@ -83,8 +82,8 @@ def _factor_beside(rows: np.ndarray, modes: int) -> np.ndarray:
     return result
 
 
-def _motion(transition: Transition, matrix: np.ndarray) -> np.ndarray:
-    """Return the maps (m, 1 + n_l + n_m) from (1, xi_l, s) to motions, without rigid constraints.
+def _motion(transition: Transition, matrix: np.ndarray, held: set[int]) -> np.ndarray:
+    """Return the maps (m, 1 + n_l + n_m) from (1, xi_l, s) to motions that the rigid links ``held`` allow.
 
     matrix: T, or T'.
     """
@@ -95,7 +94,8 @@ def _motion(transition: Transition, matrix: np.ndarray) -> np.ndarray:
     columns[0] = before.asymptotic.configuration - after.asymptotic.configuration - target @ transition.offset
     rest = np.dot(matrix.T, target.T, out=columns[1 : n + 1])
     np.subtract(source.T, rest, out=rest)
-    columns[n + 1 :] = target.T
+    columns[: n + 1] = allowed(after.level.base, held, columns[: n + 1].T).T
+    columns[n + 1 :] = target.T if before.excitation.channels == 0 else allowed(after.level.base, held, target).T
     return columns.T
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,9 +13,10 @@ from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.level.level_modes import level_modes
 from multiphi_exudyn.levels.level.level_rows import level_rows
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.eigenproblems.modes import aligned_clusters
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import orthonormal
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import scalar_product
 
 __all__ = ["build_level", "independent"]
 
@@ -95,33 +97,74 @@ def _drop_damping_of_free_modes(base: ModalBase, closed: Sequence[int], free: np
 
 def independent(base: ModalBase, rigid: Sequence[int]) -> bool:
     """Return whether the directions of these rigid contacts are linearly independent: they can be closed together."""
-    return not len(rigid) or _has_full_rank(base, orthonormal(base.units[:, list(rigid)])[1])
+    return _flags_of_following(base, rigid) is not None
 
 
-def _has_full_rank(base: ModalBase, triangle: np.ndarray) -> bool:
-    """Return whether unit directions are linearly independent; triangle: R (k, k) of their QR decomposition."""
-    remainders = triangle.diagonal().tolist()
-    return triangle.shape[1] <= base.modes.count and all(abs(remainder) > INDEPENDENT for remainder in remainders)
-
-
-def _following(base: ModalBase, rigid: list[int]) -> np.ndarray:
-    """Return for every contact (c,) whether these independent rigid contacts keep its gap constant."""
-    following = base.lengths == 0
-    if not rigid:
-        return following
-    units = base.units
-    q, triangle = orthonormal(units[:, rigid])
-    if not _has_full_rank(base, triangle):
+def _following(base: ModalBase, rigid: Sequence[int]) -> np.ndarray:
+    """Return for every link (l,) whether these independent rigid ones keep its gap constant."""
+    flags = _flags_of_following(base, rigid) if len(rigid) else base.lengths == 0
+    if flags is None:
         names = ", ".join(base.links[i].name for i in rigid)
         raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
-    components = q.T @ units
-    almost = np.add.reduce(components * components) > ALMOST
-    almost[rigid] = False  # no remainder beside themselves
-    following[rigid] = True
-    if almost.any():
-        remainders = units[:, almost] - q @ components[:, almost]
-        following[almost] |= np.linalg.norm(remainders, axis=0) <= INDEPENDENT
-    return following
+    return np.asarray(flags != 0)
+
+
+def _flags_of_following(base: ModalBase, rigid: Sequence[int]) -> np.ndarray | None:
+    """Return ``_following`` as numbers, None where the rigid links are not independent."""
+    links, m, flags = len(base.links), base.modes.count, np.zeros(len(base.links))
+    if len(rigid) > m:
+        return None
+    scratch = np.empty((len(rigid) + 1) * m)
+    found = set_following(base.link_numbers, base.lengths, np.array(rigid, int), flags, scratch, m, links, len(rigid))
+    return flags if found else None
+
+
+@compiled
+def write_following(
+    links: Numbers, lengths: Numbers, rigid: Ints, flags: Numbers, scratch: Numbers, m: int, count: int, k: int
+) -> int:
+    """Set flags of the links that k rigid ones hold; return 0 where these are not independent, else 1.
+
+    links: directions (count, m). lengths: of them. scratch: (k + 1) m numbers, first unit vectors of the space of rigid
+    directions. A direction is added, or found to lie in that space, by what two orthogonalisations leave of its unit
+    vector.
+    """
+    for p in range(k):
+        link = rigid[p]
+        size = remainder_size(links, link * m, lengths[link], scratch, p * m, m, p)
+        if not size > INDEPENDENT:
+            return 0
+        for i in range(m):
+            scratch[p * m + i] /= size
+    for link in range(count):
+        square = 0.0
+        for p in range(k if lengths[link] > 0.0 else 0):
+            share = scalar_product(scratch, p * m, links, link * m, m) / lengths[link]
+            square += share * share
+        flags[link] = 1.0 if lengths[link] == 0.0 else 0.0
+        if square > ALMOST and remainder_size(links, link * m, lengths[link], scratch, k * m, m, k) <= INDEPENDENT:
+            flags[link] = 1.0
+    return 1
+
+
+@compiled
+def remainder_size(
+    links: Numbers, direction: int, length: float, scratch: Numbers, remainder: int, m: int, k: int
+) -> float:
+    """Set the remainder of a direction's unit vector beside k orthonormal ones, and return its length."""
+    if length == 0.0:
+        return 0.0
+    for i in range(m):
+        scratch[remainder + i] = links[direction + i] / length
+    for _ in range(2):
+        for p in range(k):
+            share = scalar_product(scratch, p * m, scratch, remainder, m)
+            for i in range(m):
+                scratch[remainder + i] -= share * scratch[p * m + i]
+    return math.sqrt(scalar_product(scratch, remainder, scratch, remainder, m))
+
+
+set_following = entry(write_following)
 
 
 def _rigid_body_modes(base: ModalBase, closed_directions: ClosedDirections) -> int:

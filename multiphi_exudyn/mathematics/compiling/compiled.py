@@ -184,7 +184,7 @@ class _Buffer:
         return address if last() is array else self._address(array)
 
     def _address(self, array: np.ndarray) -> Any:
-        if not (isinstance(array, np.ndarray) and array.dtype == self._dtype and array.flags.carray):
+        if not (isinstance(array, np.ndarray) and array.flags.carray and array.dtype == self._dtype):
             got = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
             raise MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}")
         if not array.size:

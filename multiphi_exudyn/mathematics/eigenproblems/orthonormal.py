@@ -1,23 +1,12 @@
-"""Orthonormal basis of a few directions, and least squares in them; for a single direction both are quotients."""
+"""Products of vectors, and what a few directions leave of them."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 
-__all__ = ["least_squares", "orthonormal", "product_error", "remove_direction", "scalar_product", "without"]
-
-
-def orthonormal(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return Q (m, k) and R (k, k), upper triangular, of directions Q R (m, k); a single zero direction stays zero."""
-    if directions.shape[1] != 1:
-        q, r = np.linalg.qr(directions)
-        return q, r
-    length = math.sqrt(float(directions[:, 0] @ directions[:, 0]))
-    return directions / (length or 1.0), np.array([[length]])
+__all__ = ["least_squares", "product_error", "remove_direction", "scalar_product", "without"]
 
 
 def least_squares(directions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
