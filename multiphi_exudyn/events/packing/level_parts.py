@@ -25,9 +25,8 @@ def level_numbers(level: LoadedLevel) -> np.ndarray:
         level.potential_form,
         level.response,
     )
-    highest = max(own.highest_frequency, level.excitation.highest_frequency)
     parts = (
-        [form.constant, highest, response.basis.unit],
+        [form.constant, level.excitation.highest_frequency, response.basis.unit],
         modal.squares,
         modal.damping.diagonal() / 2,
         level.asymptotic.drive,

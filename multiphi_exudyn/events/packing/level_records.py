@@ -68,7 +68,9 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
 
 
 def _put_chains(buffers: Buffers, response: ModalResponse) -> int:
-    """Write the chains of a response (response_arrays.py), and return where they begin."""
+    """Write the chains of a response (response_arrays.py), and return where they begin, -1 without any."""
+    if not response.chains:
+        return -1
     chains = [len(response.chains)]
     for chain in response.chains:
         parts = chain.mixing, chain.shapes.T, chain.pushes

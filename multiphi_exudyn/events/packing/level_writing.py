@@ -69,7 +69,7 @@ LEVEL_NUMBER, MODE_COUNT, CHANNEL_COUNT, TERMS, LINKS, HELD_LINKS, ALL_EXITS, KE
     SIZES
 )
 SCALARS = 3
-CONSTANT, HIGHEST, UNIT = range(SCALARS)
+CONSTANT, HIGHEST_OF_LOADS, UNIT = range(SCALARS)
 DESCRIPTION = 4  # ints of an exit: its element and state, the state requested, its firmness
 OF_STATE, REQUESTED, FIRM = 1, 2, 3
 SCALES_WIDTH = 3  # numbers of a basis: T and two more
@@ -135,7 +135,7 @@ def write_level(
 def write_modes(ints: Ints, numbers: Numbers, given: Numbers, record: int, at: int, r: int) -> None:
     """Write the highest frequency, T, omega^2, delta, the force on zero-frequency modes, omega and its inverses."""
     squares = at + 1 + SCALES_WIDTH
-    numbers[at], numbers[at + 1] = given[HIGHEST], given[UNIT]
+    numbers[at], numbers[at + 1] = given[HIGHEST_OF_LOADS], given[UNIT]
     ints[record + HIGHEST_FREQUENCY], ints[record + FORCE] = at, -1
     ints[record + FREQUENCIES], ints[record + PERIODS] = squares + 3 * r, squares + 4 * r
     for i in range(3 * r):
@@ -143,6 +143,8 @@ def write_modes(ints: Ints, numbers: Numbers, given: Numbers, record: int, at: i
     for i in range(r):
         omega = math.sqrt(abs(numbers[squares + i]))
         numbers[squares + 3 * r + i] = omega
+        if numbers[squares + i] > 0.0:
+            numbers[at] = max(numbers[at], omega / (2.0 * math.pi))
         numbers[squares + 4 * r + i] = 1.0 / omega if omega > 0.0 else 0.0
         if numbers[squares + 2 * r + i] != 0.0:
             ints[record + FORCE] = squares + 2 * r

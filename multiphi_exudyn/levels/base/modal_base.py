@@ -100,6 +100,11 @@ class ModalBase(ElementTable, Shown):
         return np.linalg.norm(self.directions, axis=0)
 
     @functools.cached_property
+    def unmoved(self) -> np.ndarray:
+        """Whether no mode of the base moves a link (l,)."""
+        return self.lengths == 0
+
+    @functools.cached_property
     def units(self) -> np.ndarray:
         """Directions (m, l) as unit vectors, zero where no mode of the base moves a contact."""
         return self.directions / np.where(self.lengths > 0, self.lengths, 1.0)
@@ -235,6 +240,10 @@ class ModalBase(ElementTable, Shown):
 
     def closed_directions(self, closed: Sequence[int], gaps: np.ndarray) -> ClosedDirections:
         """Return the directions of closed contacts with gaps (k,), parallel ones merged, but no two rigid ones."""
+        if len(closed) == 1:  # views
+            (i,), first = closed, self.direction_indices[closed[0]]
+            offset = self.direction_signs[i : i + 1] * gaps
+            return ClosedDirections(((i,),), self.directions[:, first : first + 1], self.stiffnesses[i : i + 1], offset)
         first_links = [self.direction_indices[i] for i in closed]
         if len(set(first_links)) == len(first_links):
             index, single = list(closed), tuple((i,) for i in closed)

@@ -102,7 +102,9 @@ def independent(base: ModalBase, rigid: Sequence[int]) -> bool:
 
 def _following(base: ModalBase, rigid: Sequence[int]) -> np.ndarray:
     """Return for every link (l,) whether these independent rigid ones keep its gap constant."""
-    flags = _flags_of_following(base, rigid) if len(rigid) else base.lengths == 0
+    if not len(rigid):
+        return base.unmoved
+    flags = _flags_of_following(base, rigid)
     if flags is None:
         names = ", ".join(base.links[i].name for i in rigid)
         raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")

@@ -181,17 +181,16 @@ class _Buffer:
     def from_param(self, array: np.ndarray) -> Any:
         """Return the address of an array."""
         last, address = self._last
-        return address if last() is array else self._address(array)
-
-    def _address(self, array: np.ndarray) -> Any:
+        if last() is array:
+            return address
         if not (isinstance(array, np.ndarray) and array.flags.carray and array.dtype == self._dtype):
             got = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
             raise MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}")
         if not array.size:
             return ctypes.c_void_p(array.ctypes.data)
-        first = ctypes.c_char.from_buffer(array.data)
-        if self._seen != id(array):
-            self._seen = id(array)
+        first, number = ctypes.c_char.from_buffer(array.data), id(array)
+        if self._seen != number:
+            self._seen = number
             return ctypes.byref(first)
         address = ctypes.c_void_p(ctypes.addressof(first))
         self._last = (weakref.ref(array), address)

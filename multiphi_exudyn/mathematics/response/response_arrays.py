@@ -110,11 +110,14 @@ def write_response(
 ) -> None:
     """Write the record of a response and of its basis, with all their ints, ``response_ints(r, p)``.
 
-    The numbers from squares, half_damping and scales on, the chains, and the waves are there: the rates, A, B, P and
-    V^T. given: d (p,), UNCOUPLED (r,) and POLES (p,), from ``described`` on.
+    The numbers from squares, half_damping and scales on, the chains, -1 for none, and the waves are there: the rates,
+    A, B, P and V^T. given: d (p,), UNCOUPLED (r,) and POLES (p,), from ``described`` on.
     """
     basis, maps = response + RESPONSE, rates + p
     powers, reached = basis + BASIS, basis + BASIS + 2 * p + r
+    if chains < 0:
+        chains = reached + 2 * p
+        ints[chains] = 0
     ints[response + MODES], ints[response + FREE], ints[response + REACHED] = r, basis, reached
     ints[response + FROM_DISPLACEMENT], ints[response + FROM_VELOCITY] = maps, maps + p * r
     ints[response + FROM_FORCE], ints[response + SHAPES] = maps + 2 * p * r, maps + 3 * p * r
@@ -129,7 +132,7 @@ def write_response(
 
 def response_ints(r: int, p: int) -> int:
     """Return the number of ints of a response's record."""
-    return RESPONSE + BASIS + 4 * p + r
+    return RESPONSE + BASIS + 4 * p + r + 1
 
 
 @compiled
