@@ -2,8 +2,9 @@
 
 A cantilever of 200 degrees of freedom over stops, all of its modes in the base, 12 in a level. Of every level the modes
 are found first; then the loop is given its motion, gaps and exits, the map to it and the map back, and the forms from
-which a ledger is summed. CPU time up to each of these, median of many new levels; code and base are warm. A first run
-with two new levels took 6 to 9 ms a level at commit de51912.
+which a ledger is summed. CPU time of this thread up to each of these, median of many new levels; code and base are
+warm. Threads of BLAS that have built the base spin for a while after it, and are not counted. A first run with two new
+levels took 6 to 9 ms a level at commit de51912.
 
 Run: python examples/level_cost.py
 """
@@ -58,18 +59,18 @@ def costs(model: mp.MultiPhiModel) -> list[list[float]]:
     open_level = arrays.level(nowhere)
     for i in range(len(model.contacts)):
         states = [int(k == i) for k in range(len(model.contacts))]
-        times = [time.process_time()]
+        times = [time.thread_time()]
         model.level_at((i,))
-        times.append(time.process_time())
+        times.append(time.thread_time())
         new = arrays.level(states)
-        times.append(time.process_time())
+        times.append(time.thread_time())
         for needed, source, target in (
             (a.NEED_MAP, open_level, states),
             (a.NEED_MAP, new, nowhere),
             (a.NEED_POWERS, new, states),
         ):
             supply(arrays, needed, source, target)
-            times.append(time.process_time())
+            times.append(time.thread_time())
         rows.append([1e3 * (end - times[0]) for end in times[1:]])
     return rows
 

@@ -43,7 +43,9 @@ class TestWhileNothingVaries:
         eta = np.random.default_rng(1).normal(size=(level.modal.modes, 3))
         xi = np.pad(eta, ((0, level.excitation.channels), (0, 0)))
         rest = alone.asymptotic
-        expected = 0.5 * alone.level.squares @ eta**2 + (alone.level.vectors.T @ rest.load - rest.drive) @ eta + rest.strain
+        expected = (
+            0.5 * alone.level.squares @ eta**2 + (alone.level.vectors.T @ rest.load - rest.drive) @ eta + rest.strain
+        )
         assert_allclose(alone.strain(eta), expected, rtol=1e-12)
         assert_allclose(level.strain(xi), expected, rtol=1e-12)
         assert_allclose(level.kinetic(xi), alone.kinetic(eta), rtol=1e-13)

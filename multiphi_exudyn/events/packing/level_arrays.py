@@ -320,5 +320,4 @@ class LevelArrays:
         if transition is None:
             form = start_form(level)
             return -1 if form is None else self.buffers.put("numbers", form)
-        parts = defect_form(transition, ())
-        return self.buffers.put("numbers", np.concatenate([parts.displaced, parts.moving], axis=None))
+        return self.buffers.put("numbers", defect_form(transition, ()).factors)

@@ -18,13 +18,7 @@ __all__ = ["base_parts", "channel_parts", "from_base", "level_numbers", "powers"
 
 def level_numbers(level: LoadedLevel) -> np.ndarray:
     """Return the numbers that describe a level, as level_writing.py takes them."""
-    own, modal, channels, form, response = (
-        level.level,
-        level.modal,
-        level.channels,
-        level.potential_form,
-        level.response,
-    )
+    modal, channels, form, response = level.modal, level.channels, level.potential_form, level.response
     parts = (
         [form.constant, level.excitation.highest_frequency, response.basis.unit],
         modal.squares,

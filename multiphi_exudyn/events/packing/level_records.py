@@ -55,7 +55,7 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
     free_sizes = 3 * p * r if buffers.ints[a.PRESCRIBED] else 0
     record, at = buffers.take("ints", ints), buffers.take("numbers", numbers + free_sizes)
     write_record(
-        *buffers.all, np.concatenate([described, powers, response.alone, response.poles], dtype=int, casting="unsafe"),
+        *buffers.all, np.concatenate([np.array(described), powers, response.alone, response.poles]),
         level_numbers(level), exits.described, exits.shares.links, exits.shares.numbers, record, at, rates, signals,
         rated,
     )  # fmt: skip

@@ -24,7 +24,8 @@ from scipy.linalg.lapack import dgeqrf
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.transition import Transition
 from multiphi_exudyn.levels.base.modal_base import ModalBase
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import without
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import remainder_size, remove_direction, without
 
 __all__ = ["DefectForm", "allowed", "defect_form", "factor", "held_rigidly", "over_omega"]
 __all__ += ["start_form", "struck_defects"]
@@ -34,11 +35,11 @@ __all__ += ["start_form", "struck_defects"]
 class DefectForm:
     """The maps to defects from level l to level m: (1, xi_l, s) to d, (xi'_l, s') to w / Omega.
 
-    matrix, offset, velocity_matrix: T, c and T' of s and s'.
+    factors: the triangular factors of both maps, one after the other. matrix, offset, velocity_matrix: T, c and T' of s
+    and s'.
     """
 
-    displaced: np.ndarray
-    moving: np.ndarray
+    factors: np.ndarray
     matrix: np.ndarray
     offset: np.ndarray
     velocity_matrix: np.ndarray
@@ -46,11 +47,14 @@ class DefectForm:
     def squares(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """Return |defect|^2 (k,) between states (2, k, >= n) before and after an instant."""
         n_after, n = self.matrix.shape
+        width = 1 + n + n_after
+        displaced = self.factors[: width * width].reshape(width, width)
+        moving = self.factors[width * width :].reshape(width - 1, width - 1)
         (x, v), (x_after, v_after) = before[:, :, :n], after[:, :, :n_after]
         changed = x @ self.matrix.T + self.offset - x_after
         slowed = v @ self.velocity_matrix.T - v_after
-        d = self.displaced[:, 0] + np.hstack([x, changed]) @ self.displaced[:, 1:].T
-        w = np.hstack([v, slowed]) @ self.moving.T
+        d = displaced[:, 0] + np.hstack([x, changed]) @ displaced[:, 1:].T
+        w = np.hstack([v, slowed]) @ moving.T
         return np.asarray(np.sum(d * d, axis=1) + np.sum(w * w, axis=1))
 
 
@@ -59,44 +63,119 @@ def defect_form(transition: Transition, stopped: tuple[int, ...]) -> DefectForm:
     before, after = transition.source, transition.target
     key = before.states, stopped
     if key not in after.entries:
-        base, held = after.level.base, held_rigidly(after)
-        displaced = moved = _motion(transition, transition.matrix, held)
-        if transition.velocity_matrix is not transition.matrix or not held.issuperset(stopped):
-            moved = allowed(base, held | set(stopped), _motion(transition, transition.velocity_matrix, held))
-        rates = factor(over_omega(base, moved[:, 1:]))
-        places = (
-            factor(displaced) if transition.source.excitation.channels else _factor_beside(displaced, after.level.modes)
-        )
-        after.entries[key] = DefectForm(places, rates, transition.matrix, transition.offset, transition.velocity_matrix)
+        factors = _factors(transition, held_rigidly(after), stopped)
+        after.entries[key] = DefectForm(factors, transition.matrix, transition.offset, transition.velocity_matrix)
     form: DefectForm = after.entries[key]
     return form
 
 
-def _factor_beside(rows: np.ndarray, modes: int) -> np.ndarray:
-    """Return ``factor`` of (rest, modes): the rest is orthogonal to the modes, which are orthonormal."""
-    m, columns = rows.shape
-    if m < columns:
-        return factor(rows)
-    result, rest = np.eye(columns), columns - modes
-    result[:rest, :rest] = factor(rows[:, :rest])
-    return result
+def _factors(transition: Transition, held: set[int], stopped: tuple[int, ...]) -> np.ndarray:
+    """Return the triangular factors of both maps, one after the other.
+
+    Without channels d due to s is a motion in the modes, which are orthonormal, and orthogonal to the rest: the factor
+    of that part is one.
+    """
+    (r, n), m = transition.matrix.shape, len(transition.source.level.vectors)
+    width = 1 + n + r
+    displaced, moving = _motions(transition, transition.matrix, held)
+    if transition.velocity_matrix is not transition.matrix or not held.issuperset(stopped):
+        moving = _motions(transition, transition.velocity_matrix, held | set(stopped))[1]
+    ones = r if m >= width and not transition.source.excitation.channels else 0
+    factors = np.zeros(width * width + (width - 1) ** 2)
+    triangles = [_triangle(displaced[: width - ones]).ravel(), _triangle(moving).ravel()]
+    copy_triangles(*triangles, factors, m, width, ones)
+    return factors
 
 
-def _motion(transition: Transition, matrix: np.ndarray, held: set[int]) -> np.ndarray:
-    """Return the maps (m, 1 + n_l + n_m) from (1, xi_l, s) to motions that the rigid links ``held`` allow.
+def _triangle(columns: np.ndarray) -> np.ndarray:
+    """Return the columns (k, m) of a QR decomposition of columns (k, m), which are overwritten."""
+    return np.ascontiguousarray(dgeqrf(columns.T, overwrite_a=True)[0].T) if columns.size else columns
+
+
+def _motions(transition: Transition, matrix: np.ndarray, held: set[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the maps from (1, xi_l, s) to motions that links ``held`` allow (width, m), and from (xi'_l, s') / Omega.
 
     matrix: T, or T'.
     """
     before, after = transition.source, transition.target
-    source, target = before.level.vectors, after.level.vectors
-    n = source.shape[1]
-    columns = np.empty((1 + n + target.shape[1], len(source)))  # one after the other, as a factor is formed of them
-    columns[0] = before.asymptotic.configuration - after.asymptotic.configuration - target @ transition.offset
-    rest = np.dot(matrix.T, target.T, out=columns[1 : n + 1])
-    np.subtract(source.T, rest, out=rest)
-    columns[: n + 1] = allowed(after.level.base, held, columns[: n + 1].T).T
-    columns[n + 1 :] = target.T if before.excitation.channels == 0 else allowed(after.level.base, held, target).T
-    return columns.T
+    source, target, base = before.level.vectors, after.level.vectors, after.level.base
+    (m, n), r, c = source.shape, target.shape[1], len(held)
+    width = 1 + n + r
+    columns = np.empty(((2 * width - 1) + c, m))  # one after the other, as factors are formed of them
+    np.dot(matrix.T, target.T, out=columns[1 : n + 1])
+    write_motions(
+        base.link_numbers, base.lengths, np.array(sorted(held), int), np.ascontiguousarray(source.T).ravel(),
+        np.ascontiguousarray(target.T).ravel(), transition.offset, before.asymptotic.configuration,
+        after.asymptotic.configuration, base.periods, columns.ravel(), m, n, r, c,
+        int(before.excitation.channels > 0 or held != held_rigidly(after)),
+    )  # fmt: skip
+    return columns[:width], columns[width : 2 * width - 1]
+
+
+@compiled
+def map_to_defects(
+    links: Numbers,
+    lengths: Numbers,
+    held: Ints,
+    source: Numbers,
+    target: Numbers,
+    offset: Numbers,
+    rest: Numbers,
+    rest_after: Numbers,
+    periods: Numbers,
+    columns: Numbers,
+    m: int,
+    n: int,
+    r: int,
+    c: int,
+    project_target: int,
+) -> None:
+    """Set the columns of both maps, vectors (m,) one after the other; source: modes (n, m), target: (r, m).
+
+    columns: P (y_l - y_m - Psi_m c), P (Psi_l - Psi_m T), in place of Psi_m T, and Psi_m, then the latter two over
+    Omega, then memory (c, m).
+    project_target: whether Psi_m has columns that held links may not allow.
+    """
+    width, basis = 1 + n + r, (1 + 2 * (n + r)) * m
+    for i in range(m):
+        columns[i] = rest[i] - rest_after[i]
+    for k in range(r):
+        for i in range(m):
+            columns[i] -= target[k * m + i] * offset[k]
+            columns[(1 + n + k) * m + i] = target[k * m + i]
+    for j in range(n):
+        column = (1 + j) * m
+        for i in range(m):
+            columns[column + i] = source[j * m + i] - columns[column + i]
+    for p in range(c):
+        size = remainder_size(links, held[p] * m, lengths[held[p]], columns, basis, basis + p * m, m, p)
+        for i in range(m if size > 0.0 else 0):
+            columns[basis + p * m + i] /= size
+        if size > 0.0:
+            remove_direction(columns, basis + p * m, columns, 0, m, width if project_target == 1 else 1 + n)
+    for j in range(n + r):
+        for i in range(m):
+            columns[(width + j) * m + i] = columns[(1 + j) * m + i] * periods[i]
+
+
+@compiled
+def copy_factors(displaced: Numbers, moving: Numbers, factors: Numbers, m: int, width: int, ones: int) -> None:
+    """Copy R of two QR decompositions, columns of m numbers, one matrix after the other, zero before.
+
+    The first one is (width, width), and ``ones`` continue its diagonal. The second one is narrower by one.
+    """
+    for j in range(width - ones):
+        for i in range(min(j + 1, m)):
+            factors[i * width + j] = displaced[j * m + i]
+    for j in range(width - ones, width):
+        factors[j * (width + 1)] = 1.0
+    narrow, start = width - 1, width * width
+    for j in range(narrow):
+        for i in range(min(j + 1, m)):
+            factors[start + i * narrow + j] = moving[j * m + i]
+
+
+write_motions, copy_triangles = entry(map_to_defects), entry(copy_factors)
 
 
 def start_form(level: LoadedLevel) -> np.ndarray | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,7 +15,7 @@ from multiphi_exudyn.levels.level.level_rows import level_rows
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.eigenproblems.modes import aligned_clusters
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import scalar_product
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import remainder_size, scalar_product
 
 __all__ = ["build_level", "independent"]
 
@@ -133,7 +132,7 @@ def write_following(
     """
     for p in range(k):
         link = rigid[p]
-        size = remainder_size(links, link * m, lengths[link], scratch, p * m, m, p)
+        size = remainder_size(links, link * m, lengths[link], scratch, 0, p * m, m, p)
         if not size > INDEPENDENT:
             return 0
         for i in range(m):
@@ -144,26 +143,9 @@ def write_following(
             share = scalar_product(scratch, p * m, links, link * m, m) / lengths[link]
             square += share * share
         flags[link] = 1.0 if lengths[link] == 0.0 else 0.0
-        if square > ALMOST and remainder_size(links, link * m, lengths[link], scratch, k * m, m, k) <= INDEPENDENT:
+        if square > ALMOST and remainder_size(links, link * m, lengths[link], scratch, 0, k * m, m, k) <= INDEPENDENT:
             flags[link] = 1.0
     return 1
-
-
-@compiled
-def remainder_size(
-    links: Numbers, direction: int, length: float, scratch: Numbers, remainder: int, m: int, k: int
-) -> float:
-    """Set the remainder of a direction's unit vector beside k orthonormal ones, and return its length."""
-    if length == 0.0:
-        return 0.0
-    for i in range(m):
-        scratch[remainder + i] = links[direction + i] / length
-    for _ in range(2):
-        for p in range(k):
-            share = scalar_product(scratch, p * m, scratch, remainder, m)
-            for i in range(m):
-                scratch[remainder + i] -= share * scratch[p * m + i]
-    return math.sqrt(scalar_product(scratch, remainder, scratch, remainder, m))
 
 
 set_following = entry(write_following)

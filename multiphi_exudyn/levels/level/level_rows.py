@@ -64,7 +64,7 @@ def level_rows(
     scratch = np.empty(r + (SCRATCH + c) * m + c * (c + 1) + links)
     scratch[len(scratch) - links :] = following
     stiffening, softening = sum(each > 0 for each in stiffnesses), sum(each < 0 for each in stiffnesses)
-    outcome = write_level(
+    outcome = fill_rows(
         base.level_numbers, squares, modes.ravel(), damped.ravel(), numbers, np.array(closed, int), scratch,
         m, r, len(base.points), links, k, c, stiffening, softening, INTERLACING * accuracy, int(check),
     )  # fmt: skip
@@ -253,4 +253,4 @@ def weighted_product(numbers: Numbers, weights: int, a: int, b: int, m: int) -> 
     return even + odd
 
 
-write_level = entry(write_rows)
+fill_rows = entry(write_rows)

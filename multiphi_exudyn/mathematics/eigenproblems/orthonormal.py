@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 
-__all__ = ["least_squares", "product_error", "remove_direction", "scalar_product", "without"]
+__all__ = ["least_squares", "product_error", "remainder_size", "remove_direction", "scalar_product", "without"]
 
 
 def least_squares(directions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -55,6 +57,27 @@ def remove_direction(direction: Numbers, first: int, vectors: Numbers, start: in
         share = scalar_product(direction, first, vectors, vector, m) / square
         for i in range(m):
             vectors[vector + i] -= share * direction[first + i]
+
+
+@compiled
+def remainder_size(
+    vectors: Numbers, vector: int, length: float, scratch: Numbers, basis: int, remainder: int, m: int, k: int
+) -> float:
+    """Set the remainder of a unit vector beside k orthonormal ones, and return its length; zero for a zero vector.
+
+    vector: where (m,) of this ``length`` begins. scratch: the k vectors from ``basis`` on, and memory at ``remainder``.
+    Orthogonalised twice, which leaves round-off only.
+    """
+    if length == 0.0:
+        return 0.0
+    for i in range(m):
+        scratch[remainder + i] = vectors[vector + i] / length
+    for _ in range(2):
+        for p in range(k):
+            share = scalar_product(scratch, basis + p * m, scratch, remainder, m)
+            for i in range(m):
+                scratch[remainder + i] -= share * scratch[basis + p * m + i]
+    return math.sqrt(scalar_product(scratch, remainder, scratch, remainder, m))
 
 
 @compiled

@@ -37,24 +37,9 @@ def lightly_damped(squares: np.ndarray, damping: np.ndarray) -> ModalResponse | 
     """Return the closed form for omega^2 (r,) and damping D (r, r); None where D is not symmetric, or not light."""
     r = len(squares)
     numbers = np.concatenate([squares, damping.diagonal(), damping, np.zeros((4 * r + 2, r))], axis=None)
-    if not start_pairs(numbers, r):
-        return None
-    rows = numbers.reshape(-1, r)
-    coupling, vectors, products = rows[2 : 2 + r], rows[2 + r : 2 + 3 * r], rows[2 + 3 * r : 2 + 5 * r]
-    previous, reduction = 1.0, 0.0
-    for _ in range(MOST_STEPS):
-        step = improve_pairs(numbers, r)
-        previous, reduction = step, max(reduction, step / previous)
-        vectors.dot(coupling, out=products)
-        if step * reduction <= LAST:
-            return _response(numbers, r)
-    return None
-
-
-def _response(numbers: np.ndarray, r: int) -> ModalResponse:
-    """Return the closed form from converged vectors."""
     waves = np.zeros((1 + 4 * r, r), complex)
-    write_response(numbers, waves.ravel(), r)
+    if not find_pairs(numbers, waves.ravel(), r):
+        return None
     return ModalResponse(
         basis=Exponentials(waves[0], np.zeros(r, int)),
         shapes=waves[1 : 1 + r].T,
@@ -65,6 +50,37 @@ def _response(numbers: np.ndarray, r: int) -> ModalResponse:
         alone=flags(r, False),
         poles=flags(r, True),
     )
+
+
+@compiled
+def iterate_pairs(numbers: Numbers, waves: Waves, r: int) -> int:
+    """Iterate v of all pairs until it converges, and write the closed form; return 0 where it does not, else 1."""
+    previous, reduction = 1.0, 0.0
+    if start(numbers, r) == 0:
+        return 0
+    for _ in range(MOST_STEPS):
+        step = improve(numbers, r)
+        if not step < math.inf:
+            return 0
+        previous, reduction = step, max(reduction, step / previous)
+        multiply(numbers, r)
+        if step * reduction <= LAST:
+            write(numbers, waves, r)
+            return 1
+    return 0
+
+
+@compiled
+def multiply(numbers: Numbers, r: int) -> None:
+    """Set G v of all pairs."""
+    coupling, vectors, products = 2 * r, (2 + r) * r, (2 + 3 * r) * r
+    for row in range(2 * r):
+        for j in range(r):
+            numbers[products + row * r + j] = 0.0
+        for k in range(r):
+            component = numbers[vectors + row * r + k]
+            for j in range(r if component != 0.0 else 0):
+                numbers[products + row * r + j] += component * numbers[coupling + k * r + j]
 
 
 @compiled
@@ -157,4 +173,4 @@ def write(numbers: Numbers, waves: Waves, r: int) -> None:
             waves[(1 + 2 * r) * r + row + j] = on_speed
 
 
-start_pairs, improve_pairs, write_response = entry(start), entry(improve), entry(write)
+find_pairs = entry(iterate_pairs)
