@@ -506,28 +506,3 @@ def test_the_command_line_fails_where_nothing_is_kept(monkeypatch, capsys, tmp_p
     monkeypatch.setattr(front, "_entries", [program()])
     assert cli.main(["compile"]) == 1
     assert "no folder is writable" in capsys.readouterr().err
-
-
-def test_a_process_without_numba_finds_the_same_run():
-    code = """
-import importlib.util
-import numpy as np
-import multiphi_exudyn as mp
-
-if {blocked}:
-    found = importlib.util.find_spec
-    importlib.util.find_spec = lambda name, *more: None if name == "numba" else found(name, *more)
-K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])
-chain = mp.LinearStructure(np.eye(3), K, mp.RayleighDamping(0.1, 1e-4), {{"tip": 2, "mid": 1}})
-contacts = [mp.UnilateralContact("stop", "tip", 1e-3, 1e6), mp.UnilateralContact("wall", "mid", 1e-3, float("inf"))]
-model = mp.MultiPhiModel(chain, [*contacts, mp.Friction("ring", "mid", 5.0)])
-run = mp.simulate(model, 0.1, displacement=[0.0, 0.0, -5e-3])
-print(len(run.events), *(event.time for event in run.events), run.ledger.friction)
-"""
-    runs = [
-        subprocess.run([sys.executable, "-c", code.format(blocked=each)], capture_output=True, text=True, check=True)
-        for each in (False, True)
-    ]
-    compiled_run, plain_run = (np.array(run.stdout.split(), float) for run in runs)
-    np.testing.assert_allclose(plain_run, compiled_run, rtol=1e-9)
-    assert compiled_run[0] > 5

@@ -1,9 +1,11 @@
-"""What only POSIX has is not needed on the main path: importing, simulating, pictures, scenes, the command line."""
+"""What only POSIX has, or numba, is not needed on the main path: importing, simulating, pictures, the command line."""
 
 import ast
 import subprocess
 import sys
 from pathlib import Path
+
+import numpy as np
 
 ROOT = Path(__file__).parents[2]
 POSIX = ("fcntl", "grp", "posix_ipc", "pty", "pwd", "resource", "syslog", "termios", "tty")
@@ -48,3 +50,28 @@ def test_posix_modules_are_imported_where_they_are_guarded_only():
         names = {alias.name.split(".")[0] for node in nodes if isinstance(node, ast.Import) for alias in node.names}
         names |= {str(node.module).split(".")[0] for node in nodes if isinstance(node, ast.ImportFrom)}
         assert names & set(POSIX) == GUARDED.get(path.relative_to(ROOT).as_posix(), set()), path
+
+
+def test_a_process_without_numba_finds_the_same_run():
+    code = """
+import importlib.util
+import numpy as np
+import multiphi_exudyn as mp
+
+if {blocked}:
+    found = importlib.util.find_spec
+    importlib.util.find_spec = lambda name, *more: None if name == "numba" else found(name, *more)
+K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])
+chain = mp.LinearStructure(np.eye(3), K, mp.RayleighDamping(0.1, 1e-4), {{"tip": 2, "mid": 1}})
+contacts = [mp.UnilateralContact("stop", "tip", 1e-3, 1e6), mp.UnilateralContact("wall", "mid", 1e-3, float("inf"))]
+model = mp.MultiPhiModel(chain, [*contacts, mp.Friction("ring", "mid", 5.0)])
+run = mp.simulate(model, 0.1, displacement=[0.0, 0.0, -5e-3])
+print(len(run.events), *(event.time for event in run.events), run.ledger.friction)
+"""
+    runs = [
+        subprocess.run([sys.executable, "-c", code.format(blocked=each)], capture_output=True, text=True, check=True)
+        for each in (False, True)
+    ]
+    compiled_run, plain_run = (np.array(run.stdout.split(), float) for run in runs)
+    np.testing.assert_allclose(plain_run, compiled_run, rtol=1e-9)
+    assert compiled_run[0] > 5
