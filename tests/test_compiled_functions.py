@@ -492,7 +492,7 @@ print(*sorted(one.function.__name__ for one in compiled._entries))
         "single_direction_response",
         "step_is_clear",
         "unfold",
-        "write_clear_gaps",
+        "write_gaps_and_strain",
         "write_following",
         "write_level",
         "write_rows",

@@ -205,7 +205,7 @@ class LoadedLevel(Shown):
         return float(self.kinetic(velocity) + self.strain(displacement))
 
     def strain(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the strain energy [J] of xi (r + q,) or of every column, as ``Base.strain``.
+        """Return the strain energy [J] of xi (r + q,) or of every column.
 
         Frequencies that were given count in it.
         """

@@ -56,8 +56,8 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
     record, at = buffers.take("ints", ints), buffers.take("numbers", numbers + free_sizes)
     write_record(
         *buffers.all, np.concatenate([np.array(described), powers, response.alone, response.poles]),
-        level_numbers(level), exits.described.ravel(), exits.shares.links, exits.shares.numbers, record, at, rates, signals,
-        rated,
+        level_numbers(level), exits.described.ravel(), exits.shares.links, exits.shares.numbers, record, at, rates,
+        signals, rated,
     )  # fmt: skip
     for slot, values in channel_parts(level).items():
         place = buffers.put("numbers", values)

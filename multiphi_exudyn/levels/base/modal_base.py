@@ -129,8 +129,8 @@ class ModalBase(ElementTable, Shown):
 
     @functools.cached_property
     def link_numbers(self) -> np.ndarray:
-        """The directions (l, m) and the gaps (l,), one after the other."""
-        return np.concatenate([self.directions.T, self.gaps], axis=None)
+        """Directions (l, m), gaps and ``springs`` (l,), and ``squares`` (m,), one after the other."""
+        return np.concatenate([self.directions.T, self.gaps, self.springs, self.squares], axis=None)
 
     @functools.cached_property
     def direction_indices(self) -> list[int]:
@@ -164,20 +164,6 @@ class ModalBase(ElementTable, Shown):
     def gaps_at(self, configuration: np.ndarray, initial: np.ndarray) -> np.ndarray:
         """Return the gaps (l,) [m] at y (m,), from those at y = 0."""
         return np.asarray(self.directions.T @ configuration + initial)
-
-    def strain(self, configuration: np.ndarray, closed: Sequence[int], gaps: np.ndarray) -> float:
-        """Return the energy [J] of the structure at y (m,), of closed compliant contacts, and of constant forces.
-
-        gaps: (l,) at y.
-        """
-        energy = float(self.squares.dot(configuration * configuration)) / 2 + self.energy_offset
-        if self.laws:
-            energy -= float(self.preload @ configuration)
-        if not len(closed):
-            return energy
-        index = list(closed)
-        closed_gaps = gaps[index]
-        return energy + 0.5 * float(self.springs[index] @ (closed_gaps * closed_gaps))
 
     @functools.cached_property
     def squares(self) -> np.ndarray:

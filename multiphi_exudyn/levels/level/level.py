@@ -28,7 +28,7 @@ from multiphi_exudyn.levels.level.level_override import LevelOverride
 from multiphi_exudyn.levels.level.mode_figure import mode_figure
 from multiphi_exudyn.levels.level.static_response import (
     Asymptotic,
-    gaps_at_equilibrium,
+    gaps_and_strain,
     response_of_neutral_level,
     static_response,
 )
@@ -286,14 +286,14 @@ class Level(Shown):
         base, index = self.base, list(self.indices)
         closed_directions = base.closed_at(self.indices)
         along, configuration, unbalanced = self._response(closed_directions, load + base.preload)
-        gaps = gaps_at_equilibrium(base, configuration, self.following)
+        gaps, strain = gaps_and_strain(base, configuration, index, self.following)
         return Asymptotic(
             configuration=configuration,
             gaps=gaps,
             forces=base.contact_forces(closed_directions, along, gaps)[index],
             drive=np.zeros(self.modes) if self.vibrates else np.where(self.squares, 0.0, self.vectors.T @ unbalanced),
             load=load,
-            strain=base.strain(configuration, index, gaps),
+            strain=strain,
         )
 
     def static_response(self, load: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

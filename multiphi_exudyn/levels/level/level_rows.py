@@ -20,12 +20,13 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.modal_base import INTERLACING, ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.eigenproblems.modes import align_signs, has_clusters
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import scalar_product
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = ["LevelRows", "level_rows"]
 
 CLUSTERED, DONE, VIOLATED = 0, 1, 2
-SCRATCH = 2  # vectors of a least squares solution, beside its columns
+SCRATCH = 3  # vectors of a least squares solution, beside its columns
 
 
 @dataclass(frozen=True)
@@ -213,9 +214,9 @@ def fit(
     """Set the coefficients of rigid directions that fit a residual best, at ``result`` in steps of r.
 
     By Gram-Schmidt orthogonalisation in the weighted product. scratch, after r numbers: weights and residual (m,),
-    memory for columns (c, m) and a triangle (c, c + 1).
+    memory for a weighted column (m,), columns (c, m) and a triangle (c, c + 1).
     """
-    residual, columns, triangle, q = r + m, r + 2 * m, r + (2 + c) * m, 0
+    residual, weighted, columns, triangle, q = r + m, r + 2 * m, r + 3 * m, r + (SCRATCH + c) * m, 0
     for p in range(k):
         if base[is_rigid + closed[p]] == 1.0:
             for i in range(m):
@@ -223,10 +224,12 @@ def fit(
             q += 1
     for p in range(c):
         column, row = columns + p * m, triangle + p * (c + 1)
-        square = weighted_product(scratch, r, column, column, m)
+        for i in range(m):
+            scratch[weighted + i] = scratch[r + i] * scratch[column + i]
+        square = scalar_product(scratch, weighted, scratch, column, m)
         for q in range(p + 1, c + 1):
             other = columns + q * m if q < c else residual
-            scratch[row + q] = weighted_product(scratch, r, column, other, m) / square
+            scratch[row + q] = scalar_product(scratch, weighted, scratch, other, m) / square
             for i in range(m if p + 1 < c else 0):
                 scratch[other + i] -= scratch[row + q] * scratch[column + i]
     for p in range(c - 1, -1, -1):
@@ -239,18 +242,6 @@ def fit(
         if base[is_rigid + closed[p]] == 1.0:
             numbers[result + p * r] = scratch[triangle + q * (c + 1) + c]
             q += 1
-
-
-@compiled
-def weighted_product(numbers: Numbers, weights: int, a: int, b: int, m: int) -> float:
-    """Return the sum of w a b over m elements, in two independent sums, which a processor adds up together."""
-    even, odd = 0.0, 0.0
-    for i in range(0, m - 1, 2):
-        even += numbers[weights + i] * numbers[a + i] * numbers[b + i]
-        odd += numbers[weights + i + 1] * numbers[a + i + 1] * numbers[b + i + 1]
-    if m % 2 == 1:
-        even += numbers[weights + m - 1] * numbers[a + m - 1] * numbers[b + m - 1]
-    return even + odd
 
 
 fill_rows = entry(write_rows)

@@ -18,11 +18,11 @@ import numpy as np
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.base.modal_base import ModalBase
-from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING, INDEPENDENT
 from multiphi_exudyn.mathematics.round_off import ZERO, drop_round_off
 
-__all__ = ["Asymptotic", "gaps_at_equilibrium", "response_of_neutral_level", "static_response"]
+__all__ = ["Asymptotic", "gaps_and_strain", "response_of_neutral_level", "static_response"]
 
 NONE = np.zeros((0, 0))  # rigid-body motions of a structure that has none
 
@@ -101,27 +101,46 @@ def single_direction_response(
 single_response = entry(single_direction_response)
 
 
-def gaps_at_equilibrium(base: ModalBase, configuration: np.ndarray, following: np.ndarray) -> np.ndarray:
-    """Return the gaps (l,) at y (m,), with zeros in place of round-off; following (l,): gaps that others determine."""
-    gaps = np.array(following, float)
-    write_gaps(base.link_numbers, np.ascontiguousarray(configuration), gaps, len(configuration), len(gaps))
-    return gaps
+def gaps_and_strain(
+    base: ModalBase, configuration: np.ndarray, closed: list[int], following: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Return the gaps (l,) at y (m,), zero where they are round-off, and the strain energy [J].
+
+    That of the structure, of the springs of closed links, and of the constant forces of force laws. following (l,):
+    gaps that others determine.
+    """
+    gaps, y = np.array(following, float), np.ascontiguousarray(configuration)
+    energy = float(write_gaps(base.link_numbers, y, gaps, np.array(closed, int), len(y), len(gaps), len(closed)))
+    if base.laws:
+        energy += base.energy_offset - float(base.preload @ y)
+    return gaps, energy
 
 
 @compiled
-def write_clear_gaps(links: Numbers, y: Numbers, gaps: Numbers, m: int, count: int) -> None:
-    """Replace flags of links that follow others by gaps; links: directions (count, m), then gaps at y = 0 (count,)."""
-    for k in range(count):
-        gap = links[count * m + k]
+def write_gaps_and_strain(links: Numbers, y: Numbers, gaps: Numbers, closed: Ints, m: int, count: int, k: int) -> float:
+    """Replace flags of links that follow others by gaps; return the energy of the structure and of k closed springs.
+
+    links: ``ModalBase.link_numbers``, of ``count`` links.
+    """
+    energy, constants = 0.0, count * m
+    springs, squares = constants + count, constants + 2 * count
+    for link in range(count):
+        gap = links[constants + link]
         size = abs(gap)
         for i in range(m):
-            gap += links[k * m + i] * y[i]
-            size += abs(links[k * m + i] * y[i])
-        tolerance = FOLLOWING if gaps[k] == 1.0 else ZERO
-        gaps[k] = gap if abs(gap) > tolerance * size else 0.0
+            term = links[link * m + i] * y[i]
+            gap += term
+            size += abs(term)
+        tolerance = FOLLOWING if gaps[link] == 1.0 else ZERO
+        gaps[link] = gap if abs(gap) > tolerance * size else 0.0
+    for i in range(m):
+        energy += links[squares + i] * y[i] * y[i]
+    for p in range(k):
+        energy += links[springs + closed[p]] * gaps[closed[p]] * gaps[closed[p]]
+    return 0.5 * energy
 
 
-write_gaps = entry(write_clear_gaps)
+write_gaps = entry(write_gaps_and_strain)
 
 
 def response_of_neutral_level(

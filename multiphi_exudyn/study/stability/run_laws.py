@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from multiphi_exudyn.events.transitions.state import Phase, total_loss
+from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.round_off import ZERO
 from multiphi_exudyn.mechanics.elements.element import Element
 from multiphi_exudyn.mechanics.elements.friction import Friction
@@ -162,7 +163,14 @@ def _start_energy(run: Trajectory) -> float:
         return start.state.level.energy(start.state.displacement, start.state.velocity)
     gaps = base.gaps_at(start.displacement, start.gaps) if start.penetrating else start.gaps
     kinetic = 0.5 * float(start.velocity @ start.velocity)
-    return kinetic + float(base.strain(start.displacement, start.penetrating, gaps))
+    return kinetic + strain_energy(base, start.displacement, start.penetrating, gaps)
+
+
+def strain_energy(base: ModalBase, y: np.ndarray, closed: Sequence[int], gaps: np.ndarray) -> float:
+    """Energy [J] of the structure at y (m,), of closed springs at their gaps, (l,), and of constant forces of laws."""
+    index = list(closed)
+    springs = 0.5 * float(base.springs[index] @ gaps[index] ** 2)
+    return 0.5 * float(base.squares @ y**2) + springs + base.energy_offset - float(base.preload @ y)
 
 
 def ledger(run: Trajectory, scale: float) -> str | None:
