@@ -73,7 +73,7 @@ ENTRIES = [
     (free_response, "write_oscillations"),
     (light_damping, "find_pairs"),
     (level_records, "write_record"),
-    (exits, "write_rows"),
+    (exits, "fill_signals"),
     (defect_forms, "write_motions"),
     (defect_forms, "copy_triangles"),
 ]

@@ -80,7 +80,7 @@ def signal_table(level: LoadedLevel, exits: Sequence[tuple[int, Exit]]) -> np.nd
     own, shares = level.level, ExitShares.of(level.level.base.link_indices, exits)
     table = np.zeros((len(exits), 2 * level.width + 1))
     held, parts = np.array(own.indices, int), signal_parts(level)
-    write_rows(table.ravel(), parts, held, shares.links, shares.numbers, *own.gap_rows.shape, len(held), len(exits))
+    fill_signals(table.ravel(), parts, held, shares.links, shares.numbers, *own.gap_rows.shape, len(held), len(exits))
     return table
 
 
@@ -170,7 +170,7 @@ def write_signals(
         write_signal(result, row, parts, 0, held, 0, exits, shares, links, n, k, count, exit_)
 
 
-write_rows = entry(write_signals)
+fill_signals = entry(write_signals)
 
 
 def force_shares(level: LoadedLevel, element: int, exit_: Exit) -> list[tuple[int, float]]:

@@ -43,10 +43,12 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     if rows is None:
         squares, vectors = aligned_clusters(squares, vectors, *base.observed_rows)
         rows = level_rows(base, closed, stiffnesses, squares, vectors, following, accuracy, check=False)
-    assert rows is not None, "it is one only where clusters are checked"
-    zero = squares == 0
+    assert rows is not None, "it is None only where clusters are checked"
+    neutral = rows.vectors[:, :0]
     if not is_vibrating:
+        zero = squares == 0
         _drop_damping_of_free_modes(base, closed, zero, rows.damping)
+        neutral = rows.vectors[:, zero] if np.count_nonzero(zero) > rigid_body else neutral
     return Level(
         closed=tuple(base.links[i].name for i in closed if i not in base.laws),
         indices=indices,
@@ -59,7 +61,7 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
         speed_rows=rows.gaps,
         force_rows=rows.forces,
         force_rate_rows=rows.force_rates,
-        neutral=rows.vectors[:, zero] if np.count_nonzero(zero) > rigid_body else rows.vectors[:, :0],
+        neutral=neutral,
         computed=squares,
         kept_beyond=0,
     )
