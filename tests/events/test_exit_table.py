@@ -5,10 +5,12 @@ import math
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.events.transitions.exit_table import ExitTable
+from multiphi_exudyn.events.transitions.exits import exits_of, signal_table
+from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.mechanics.elements.element import link_indices
 
 ELEMENTS = [
@@ -42,3 +44,12 @@ def shares_of(shares, number, count):
     listed = range(*shares.links[number : number + 2].tolist())
     parts = shares.numbers[count:].reshape(-1, 3).tolist()
     return shares.numbers[number], [(shares.links[count + 1 + k], *parts[k]) for k in listed]
+
+
+def test_a_limit_that_equals_the_load_but_for_round_off_is_reached():
+    structure = mp.LinearStructure(np.eye(2), 4e4 * np.array([[2, -1], [-1, 1]]), points={"tip": 1, "mid": 0})
+    model = mp.MultiPhiModel(structure, [mp.Friction("ring", "tip", 0.3)], modes="all")
+    level = LoadedLevels.static(model, model.base_load({"tip": 0.1 + 0.2})).level((0,))
+    signals = signal_table(level, exits_of(level))
+    assert signals[0, -1] == 0.0
+    assert_allclose(signals[1, -1], 0.6, rtol=1e-15)
