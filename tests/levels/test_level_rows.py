@@ -99,3 +99,15 @@ def test_plain_python_packs_what_compiled_functions_do(monkeypatch, closed):
     assert_array_equal(ints, compiled[0])
     for own, other in ((numbers, compiled[1]), (waves, compiled[2])):
         assert_allclose(own, other, rtol=1e-9, atol=1e-12 * np.max(np.abs(own[np.isfinite(own)])))
+
+
+def test_a_struck_contact_that_closed_ones_hold_takes_no_further_motion():
+    made = model()
+    between = mp.UnilateralContact("between", {"p0": 0.6, "p2": 0.8}, 1e-3, math.inf)
+    made = mp.MultiPhiModel(made.structure, [*made.contacts, between], modes=9)
+    levels = LoadedLevels.static(made, np.ones(made.base.modes.count))
+    entered = levels.transition(levels.level((0,) * 7), levels.level((1, 0, 1, *(0,) * 4)))
+    alone, struck = (defect_forms.defect_form(entered, stopped).factors for stopped in ((), (6,)))
+    size = 1 + sum(entered.matrix.shape)
+    forms = [moving.T @ moving for moving in (f[size**2 :].reshape(size - 1, size - 1) for f in (alone, struck))]
+    assert_allclose(forms[1], forms[0], rtol=0, atol=1e-12 * np.max(forms[0]))

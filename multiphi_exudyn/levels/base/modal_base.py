@@ -105,11 +105,6 @@ class ModalBase(ElementTable, Shown):
         return self.lengths == 0
 
     @functools.cached_property
-    def units(self) -> np.ndarray:
-        """Directions (m, l) as unit vectors, zero where no mode of the base moves a contact."""
-        return self.directions / np.where(self.lengths > 0, self.lengths, 1.0)
-
-    @functools.cached_property
     def observed_rows(self) -> tuple[np.ndarray, np.ndarray]:
         """Rows (k, m) of links and points, and their largest values (k + m,) at a unit mode, coordinates last."""
         rows = np.vstack([self.directions.T, self.points])

@@ -8,15 +8,7 @@ import numpy as np
 
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 
-__all__ = ["least_squares", "product_error", "remainder_size", "remove_direction", "scalar_product", "without"]
-
-
-def least_squares(directions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Return the smallest X (k, j) that minimises |directions X - vectors|; directions: (m, k), vectors: (m, j)."""
-    if directions.shape[1] != 1:
-        return np.asarray(np.linalg.lstsq(directions, vectors, rcond=None)[0])
-    square = float(directions[:, 0] @ directions[:, 0])
-    return np.asarray(directions.T @ vectors / (square or np.inf))
+__all__ = ["product_error", "remainder_size", "remove_direction", "scalar_product", "without"]
 
 
 def without(directions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -25,7 +17,7 @@ def without(directions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     if directions.shape[1] == 1:
         remove_from(np.ascontiguousarray(directions[:, 0]), 0, result.ravel(), 0, len(directions), vectors[0].size)
     else:
-        result -= least_squares(directions, vectors).T @ directions.T
+        result -= np.linalg.lstsq(directions, vectors, rcond=None)[0].T @ directions.T
     return result.T
 
 
