@@ -7,6 +7,7 @@ import importlib
 import math
 import multiprocessing
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -200,15 +201,16 @@ def test_a_division_by_zero_is_infinite_and_no_error():
     assert Entry(ratio)(np.array([1.0, 0.0])) == math.inf
 
 
-def test_an_entry_sees_another_array_and_none_can_be_moved_under_it():
+def test_an_entry_sees_another_array_and_one_that_has_moved():
     run, numbers = Entry(square), np.array([3.0])
     assert run(numbers, 0) == 9.0
     assert run(np.array([4.0]), 0) == 16.0
-    assert run(numbers, 0) == 9.0
-    numbers.resize(100_000, refcheck=False)  # its address is not kept yet
     assert run(numbers, 0) == run(numbers, 0) == 9.0
-    with pytest.raises(ValueError, match="cannot resize"):
-        numbers.resize(1_000_000, refcheck=False)
+    for size in (100_000, 1_000_000):
+        numbers.resize(size, refcheck=False)
+        assert run(numbers, 0) == run(numbers, 0) == 9.0
+        assert run(numbers, size - 1) == 0.0
+    assert run(pickle.loads(pickle.dumps(numbers)), 0) == 9.0
 
 
 def test_an_entry_bound_to_its_buffers_takes_the_rest_and_sees_what_they_then_hold():

@@ -13,7 +13,6 @@ import importlib.util
 import sys
 import threading
 import warnings
-import weakref
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from types import FunctionType, NoneType
@@ -49,6 +48,7 @@ TYPES: dict[Any, np.dtype] = {
     Waves: np.dtype(complex),
 }
 SCALARS: dict[Any, Any] = {int: ctypes.c_int64, float: ctypes.c_double, NoneType: None}
+NO_BYTES = ctypes.c_char * 0  # at an address
 
 _one_at_a_time = threading.RLock()  # numba and LLVM are not thread-safe
 _entries: list[Entry] = []
@@ -168,30 +168,17 @@ def _compile(functions: Sequence[FunctionType]) -> list[bytes]:
 
 
 class _Buffer:
-    """Argument type of a buffer for ctypes: the address of its first number, cached for an array that comes twice.
-
-    That array may be deleted meanwhile, but not moved: NumPy does not resize an array with a weak reference in place.
-    """
+    """Argument type of a buffer for ctypes: the address of its first number."""
 
     def __init__(self, dtype: np.dtype) -> None:
         self._dtype = dtype
-        self._last: tuple[Callable[[], Any], ctypes.c_void_p] = (lambda: self, ctypes.c_void_p())
-        self._seen = 0
 
-    def from_param(self, array: np.ndarray) -> Any:
-        """Return the address of an array."""
-        last, address = self._last
-        if last() is array:
-            return address
-        if not (isinstance(array, np.ndarray) and array.flags.carray and array.dtype == self._dtype):
+    def from_param(self, array: Any) -> ctypes.Array[ctypes.c_char]:
+        """Return where an array begins; ctypes refuses one that is not contiguous, or not writable."""
+        try:
+            if array.dtype != self._dtype:
+                raise TypeError
+            return NO_BYTES.from_buffer(array)
+        except (AttributeError, TypeError) as error:
             got = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
-            raise MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}")
-        if not array.size:
-            return ctypes.c_void_p(array.ctypes.data)
-        first, number = ctypes.c_char.from_buffer(array.data), id(array)
-        if self._seen != number:
-            self._seen = number
-            return ctypes.byref(first)
-        address = ctypes.c_void_p(ctypes.addressof(first))
-        self._last = (weakref.ref(array), address)
-        return address
+            raise MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}") from error
