@@ -474,7 +474,6 @@ print(*sorted(one.function.__name__ for one in compiled._entries))
         "align_signs",
         "clear",
         "copy_factors",
-        "has_no_coupling",
         "integrate",
         "integrate_works",
         "is_far",

@@ -34,7 +34,7 @@ __all__ = ["LevelArrays"]
 
 ARRAY_BYTES = 2**29  # of a model's arrays under all loads: half of what a model may keep (level_store.py)
 FEWEST_LEVELS = 8  # are kept whatever their size: a run that alternates between a few would pack them at every event
-EMPTY_RING = np.zeros(0)  # of a run without decisions
+NONE = np.zeros(0)
 ROOM = 1024  # segments, and events, that the loop records before the run copies them
 
 
@@ -154,7 +154,7 @@ class LevelArrays:
         """The decisions so far, and the contents of the ring."""
         decisions = int(self.buffers.ints[a.DECISIONS])
         if not decisions:
-            return 0, EMPTY_RING
+            return 0, NONE
         count = 2 * min(decisions, int(self.buffers.ints[a.WINDOW]) + 1)
         return decisions, self.buffers.numbers[self._ring : self._ring + count].copy()
 
@@ -300,24 +300,19 @@ class LevelArrays:
 
     def _map(self, source: int, target: int) -> int:
         """Pack the map between two levels and return its record."""
-        put, level = self.buffers.put, self._loaded_in(target)
-        sizes, terms, transition = np.zeros(0), None, None
+        level, sizes, terms, transition = self._loaded_in(target), NONE, None, None
         if source == self.base:
             matrix, offset, rate_matrix, sizes = from_base(level)
         else:
             transition = self.levels.transition(self._loaded_in(source), level)
             matrix, offset, rate_matrix = transition.matrix, transition.offset, transition.velocity_matrix
             terms = transition.terms
-        matrix_at = put("numbers", matrix)
-        same = rate_matrix is matrix or np.array_equal(rate_matrix, matrix)
-        rate_at = matrix_at if same else put("numbers", rate_matrix)
-        terms_at = -1 if terms is None else put("numbers", terms)
-        defect = self._defect(transition, level) if self.ints[a.JUDGED] else -1
-        return put("ints", [matrix_at, put("numbers", offset), rate_at, -1, put("numbers", sizes), terms_at, defect])
+        is_one_map = rate_matrix is matrix or np.array_equal(rate_matrix, matrix)
+        defects = self._defects(transition, level) if self.ints[a.JUDGED] else None
+        parts = matrix, offset, None if is_one_map else rate_matrix, sizes, terms, defects
+        matrix_at, offset_at, rate_at, *further = self.buffers.put_parts("numbers", parts)
+        return self.buffers.put("ints", [matrix_at, offset_at, matrix_at if is_one_map else rate_at, -1, *further])
 
-    def _defect(self, transition: Transition | None, level: LoadedLevel) -> int:
-        """Pack the form of the defect of a transition, None for one from the base, and return its start, or -1."""
-        if transition is None:
-            form = start_form(level)
-            return -1 if form is None else self.buffers.put("numbers", form)
-        return self.buffers.put("numbers", defect_form(transition, ()).factors)
+    def _defects(self, transition: Transition | None, level: LoadedLevel) -> np.ndarray | None:
+        """Return the form of the defect of a transition, None for one from the base; None if there is none."""
+        return start_form(level) if transition is None else defect_form(transition, ()).factors

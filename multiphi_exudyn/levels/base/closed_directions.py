@@ -38,19 +38,28 @@ class ClosedDirections:
         return self.vectors[:, self.rigid]
 
     @property
-    def orthogonal(self) -> tuple[ClosedDirections, np.ndarray]:
-        """The same with orthogonal directions Q of the rigid contacts, and R (k, k): their directions are Q R.
+    def orthogonal(self) -> ClosedDirections:
+        """The same with orthogonal directions Q of the rigid contacts, whose own directions are Q R.
 
         The small difference of nearly parallel directions would be lost in round-off. Q has their unit of length.
         """
-        count = self.pinned.shape[1]
-        if count < 2:
-            return self, np.ones((count, count))  # not kept: a reference to itself would delay its release
-        return self._orthogonalised
+        return self._orthogonalised[0] if self._has_several_rigid else self  # not kept: no reference to itself
+
+    def from_orthogonal(self, forces: np.ndarray) -> np.ndarray:
+        """Return forces (d,) along these directions from those along the orthogonal ones."""
+        if not self._has_several_rigid:
+            return forces
+        result = forces.copy()
+        result[self.rigid] = np.linalg.solve(self._orthogonalised[1], forces[self.rigid])
+        return result
+
+    @property
+    def _has_several_rigid(self) -> bool:
+        return int(np.count_nonzero(self.rigid)) > 1
 
     @functools.cached_property
     def _orthogonalised(self) -> tuple[ClosedDirections, np.ndarray]:
-        """``orthogonal`` for two or more rigid directions."""
+        """``orthogonal`` for two or more rigid directions, and R (k, k)."""
         rigid = self.rigid
         directions = self.pinned
         length = float(np.max(np.linalg.norm(directions, axis=0))) or 1.0

@@ -255,16 +255,16 @@ class ModalBase(ElementTable, Shown):
         further = [i for i in members if math.isinf(self.stiffnesses[i])][1:]
         return [[i for i in members if i not in further], *([i] for i in further)]
 
-    def contact_forces(self, closed_directions: ClosedDirections, along: np.ndarray, gaps: np.ndarray) -> np.ndarray:
-        """Return lambda (l,) [N] from forces (d,) along closed directions and gaps (l,); zero for open contacts.
+    def contact_forces(
+        self, closed: list[int], closed_directions: ClosedDirections, along: np.ndarray, gaps: np.ndarray
+    ) -> np.ndarray:
+        """Return lambda (k,) [N] of closed contacts from forces (d,) along their directions and gaps (l,).
 
         The forces of springs of one direction follow from their gaps; a rigid contact among them has the remainder.
         """
+        if closed_directions.members == tuple((i,) for i in closed):
+            return np.asarray(self.direction_signs[closed] * along)
         forces = np.zeros(len(self.links))
-        if all(len(members) == 1 for members in closed_directions.members):
-            index = [i for (i,) in closed_directions.members]
-            forces[index] = self.direction_signs[index] * along
-            return forces
         for members, force in zip(closed_directions.members, along.tolist(), strict=True):
             index, rigid = list(members), [i for i in members if math.isinf(self.stiffnesses[i])]
             if len(index) > 1:
@@ -274,7 +274,7 @@ class ModalBase(ElementTable, Shown):
                 force -= self.direction_signs[springs] @ forces[springs]
                 index = rigid
             forces[index] = self.direction_signs[index] * force
-        return forces
+        return forces[closed]
 
 
 def parallel(directions: np.ndarray) -> list[int]:

@@ -49,7 +49,9 @@ def _frictionless_response(
         )
     closed_directions = base.closed_directions(index, gaps[index])
     along, configuration = static_response(base, closed_directions, load)
-    return base.contact_forces(closed_directions, along, base.gaps_at(configuration, gaps)), configuration
+    forces = np.zeros(len(base.links))
+    forces[index] = base.contact_forces(index, closed_directions, along, base.gaps_at(configuration, gaps))
+    return forces, configuration
 
 
 def _check_unique(base: ModalBase, sliders: list[int], friction_forces: np.ndarray) -> None:

@@ -29,14 +29,14 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     closed = list(indices)
     closed_directions = base.closed_at(indices)
     following = _following(base, [i for i in closed if base.links[i].rigid])
-    orthogonal, _ = closed_directions.orthogonal
+    orthogonal = closed_directions.orthogonal
     squares, vectors, accuracy = level_modes(base, orthogonal, modes)
     rigid_body = _rigid_body_modes(base, orthogonal)
     if rigid_body:
         squares[np.argsort(np.abs(squares), kind="stable")[:rigid_body]] = 0.0
     if accuracy:
         squares[np.abs(squares) <= NEUTRAL * accuracy] = 0.0
-    if not (is_vibrating := bool(squares.all())):
+    if not (is_vibrating := np.count_nonzero(squares) == len(squares)):
         squares, vectors = _aligned_free_modes(base, squares, vectors, closed)
     stiffnesses = closed_directions.stiffness.tolist()
     rows = level_rows(base, closed, stiffnesses, squares, vectors, following, accuracy, check=is_vibrating)

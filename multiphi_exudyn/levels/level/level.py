@@ -127,7 +127,7 @@ class Level(Shown):
     @functools.cached_property
     def vibrates(self) -> bool:
         """Whether no mode has zero frequency."""
-        return bool(self.squares.all())
+        return int(np.count_nonzero(self.squares)) == len(self.squares)
 
     @functools.cached_property
     def omega(self) -> np.ndarray:
@@ -168,7 +168,7 @@ class Level(Shown):
         law's name. A contact beside a closed rigid contact of the same direction cannot move and is not listed.
         """
         base = self.base
-        closed_directions, _ = base.closed_at(self.indices).orthogonal
+        closed_directions = base.closed_at(self.indices).orthogonal
         springs, flexibilities = np.flatnonzero(~closed_directions.rigid), self._flexibilities(closed_directions)
         names = [base.labels[closed_directions.members[s][0]] for s in springs.tolist()]
         rows = closed_directions.vectors[:, springs].T
@@ -290,7 +290,7 @@ class Level(Shown):
         return Asymptotic(
             configuration=configuration,
             gaps=gaps,
-            forces=base.contact_forces(closed_directions, along, gaps)[index],
+            forces=base.contact_forces(index, closed_directions, along, gaps),
             drive=np.zeros(self.modes) if self.vibrates else np.where(self.squares, 0.0, self.vectors.T @ unbalanced),
             load=load,
             strain=strain,
@@ -302,8 +302,7 @@ class Level(Shown):
         initial[index] = gaps
         closed_directions = base.closed_directions(index, gaps)
         along, configuration, _ = self._response(closed_directions, load)
-        forces = base.contact_forces(closed_directions, along, base.gaps_at(configuration, initial))
-        return forces[index], configuration
+        return base.contact_forces(index, closed_directions, along, base.gaps_at(configuration, initial)), configuration
 
     def _response(
         self, closed_directions: ClosedDirections, total: np.ndarray

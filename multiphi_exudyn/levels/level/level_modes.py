@@ -112,8 +112,7 @@ def _rank_one_changes(
     if len(changes) == 1:
         return squares, changes[0], 0.0
     vectors = functools.reduce(lambda later, change: change @ later, reversed(changes))
-    pinned = closed_directions.pinned
-    return squares, without(pinned, vectors) if pinned.shape[1] else vectors, 0.0
+    return squares, without(closed_directions.pinned, vectors) if math.inf in stiffness else vectors, 0.0
 
 
 def _singular_value_modes(

@@ -60,7 +60,7 @@ def level_rows(
     numbers, modes = np.empty(r * (links + r + 2 * k)), np.array(vectors.T, order="C")
     values, damping = numbers[: r * links].reshape(links, r), numbers[r * links : r * (links + r)].reshape(r, r)
     np.matmul(base.directions.T, vectors, out=values)
-    damped = np.array(base.damped(vectors, closed).T, order="C")
+    damped = np.ascontiguousarray(base.damped(vectors, closed).T)
     np.matmul(modes, damped.T, out=damping)
     scratch = np.empty(r + (SCRATCH + c) * m + c * (c + 1) + links)
     scratch[len(scratch) - links :] = following

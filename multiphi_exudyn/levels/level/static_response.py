@@ -61,11 +61,8 @@ def static_response(
         )
         if math.isfinite(force):
             return np.array([force]), configuration
-    orthogonal, mixing = closed_directions.orthogonal
-    forces, configuration = _response(base, orthogonal, load)
-    if orthogonal is not closed_directions:
-        forces[closed_directions.rigid] = np.linalg.solve(mixing, forces[closed_directions.rigid])
-    return forces, configuration
+    forces, configuration = _response(base, closed_directions.orthogonal, load)
+    return closed_directions.from_orthogonal(forces), configuration
 
 
 @compiled

@@ -24,15 +24,12 @@ import numpy as np
 import scipy.linalg
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 from multiphi_exudyn.mathematics.response.exponentials import Exponentials
 from multiphi_exudyn.mathematics.response.free_response import Chain, ModalResponse, is_slow, slow_powers, uncoupled
 from multiphi_exudyn.mathematics.response.light_damping import lightly_damped
 from multiphi_exudyn.mathematics.response.motion_parts import Parts, parts_of
 
 __all__ = ["modal_response"]
-
-DIAGONAL = 1e-13  # of sqrt(D_ii D_jj): off-diagonal damping below it is round-off of a diagonal matrix
 
 
 def modal_response(
@@ -42,28 +39,10 @@ def modal_response(
 
     duration: of the longest motion [s]. Raises NumericalFailure where rates are not distinct by more than round-off.
     """
-    is_uncoupled = coupling is None or not np.count_nonzero(coupling)
-    if is_uncoupled and is_diagonal(np.ascontiguousarray(damping).ravel(), len(squares)):
-        return uncoupled(squares, np.diagonal(damping), duration)
-    response = lightly_damped(squares, damping) if is_uncoupled else None
-    return response or _coupled(squares, np.diag(squares) + (0.0 if coupling is None else coupling), damping, duration)
-
-
-@compiled
-def has_no_coupling(damping: Numbers, r: int) -> int:
-    """Return 1 where the off-diagonal elements of damping (r, r) are round-off of its diagonal, else 0."""
-    largest = 0.0
-    for i in range(r):
-        largest = max(largest, abs(damping[i * r + i]))
-    for i in range(r):
-        for j in range(r):
-            scale = max(math.sqrt(abs(damping[i * r + i] * damping[j * r + j])), largest * DIAGONAL)
-            if i != j and abs(damping[i * r + j]) > DIAGONAL * scale:
-                return 0
-    return 1
-
-
-is_diagonal = entry(has_no_coupling)
+    if coupling is not None and np.count_nonzero(coupling):
+        return _coupled(squares, np.diag(squares) + coupling, damping, duration)
+    response = uncoupled(squares, damping, duration) or lightly_damped(squares, damping)
+    return response or _coupled(squares, np.diag(squares), damping, duration)
 
 
 def _coupled(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, duration: float) -> ModalResponse:

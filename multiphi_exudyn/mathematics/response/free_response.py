@@ -24,7 +24,9 @@ from multiphi_exudyn.mathematics.round_off import SLOW
 
 __all__ = ["Chain", "ModalResponse", "flags", "is_slow", "slow_powers", "uncoupled"]
 
+DIAGONAL = 1e-13  # of sqrt(D_ii D_jj): off-diagonal damping below it is round-off of a diagonal matrix
 NEARLY_CRITICAL = 1e-2  # |zeta^2 - 1|^(1/2) below which the Taylor polynomial of degree 5 is more accurate
+COUPLED = -1  # in place of a number of modes
 LAST_POWER = 1e-17  # of the first: powers of time below this, in the speed of slow motion, are truncated
 
 
@@ -108,18 +110,21 @@ def slow_powers(rate: complex, duration: float) -> list[complex]:
     return weights
 
 
-def uncoupled(squares: np.ndarray, damping: np.ndarray, duration: float = math.inf) -> ModalResponse:
-    """Return the closed form for omega^2 (r,) [rad2/s2], negative for growing modes, and damping D_ii (r,) [1/s].
+def uncoupled(squares: np.ndarray, damping: np.ndarray, duration: float = math.inf) -> ModalResponse | None:
+    """Return the closed form for omega^2 (r,) [rad2/s2], negative for growing modes, and diagonal damping D [1/s].
 
-    duration: of the longest motion [s].
+    None where D (r, r) is not diagonal. duration: of the longest motion [s].
     """
     r, further = len(squares), list[Term]()
-    numbers, waves = np.concatenate([squares, 0.5 * damping, np.zeros(r)]), np.zeros((1 + 4 * r, r), complex)
+    numbers, waves = np.concatenate([squares, damping, squares], axis=None), np.zeros((1 + 4 * r, r), complex)
     rates, powers, maps = waves[0], np.zeros(r, int), waves[1:].reshape(4, r, r)
-    if write_oscillations(numbers, waves.ravel(), r) < r:
-        oscillates = numbers[2 * r :] == 1.0
+    count_of_oscillating = write_oscillations(numbers, waves.ravel(), r)
+    if count_of_oscillating == COUPLED:
+        return None
+    if count_of_oscillating < r:
+        oscillates = numbers[r + r * r :] == 1.0
         for k in np.flatnonzero(~oscillates).tolist():
-            further += _mode_terms(k, float(squares[k]), float(damping[k]) / 2, duration)
+            further += _mode_terms(k, float(squares[k]), float(damping[k, k]) / 2, duration)
         count = int(np.count_nonzero(oscillates))
         maps = np.concatenate([maps[:, oscillates], np.zeros((4, len(further), r))], axis=1)
         rates = np.concatenate([rates[oscillates], [rate for _, rate, _, _ in further]])
@@ -139,14 +144,33 @@ def uncoupled(squares: np.ndarray, damping: np.ndarray, duration: float = math.i
 
 
 @compiled
+def is_diagonal(damping: Numbers, start: int, r: int) -> int:
+    """Return 1 where the off-diagonal elements of damping (r, r), from ``start`` on, are round-off, else 0."""
+    largest = 0.0
+    for i in range(r):
+        largest = max(largest, abs(damping[start + i * (r + 1)]))
+    for i in range(r):
+        for j in range(r):
+            product = damping[start + i * (r + 1)] * damping[start + j * (r + 1)]
+            scale = max(math.sqrt(abs(product)), largest * DIAGONAL)
+            if i != j and abs(damping[start + i * r + j]) > DIAGONAL * scale:
+                return 0
+    return 1
+
+
+@compiled
 def oscillations(numbers: Numbers, waves: Waves, r: int) -> int:
     """Write rates, A, B, P and V^T of the modes that oscillate, each in its place, and mark them; return how many do.
 
-    numbers: omega^2, delta and marks (r,). waves: rates (r,) and matrices (4, r, r), zero before.
+    COUPLED where D is not diagonal. numbers: omega^2 (r,), D (r, r) and marks (r,), of any value before. waves: rates
+    (r,) and matrices (4, r, r), zero before.
     """
-    count = 0
+    count, marks = 0, r + r * r
+    if is_diagonal(numbers, r, r) == 0:
+        return COUPLED
     for k in range(r):
-        delta, omega = numbers[r + k], math.sqrt(abs(numbers[k]))
+        delta, omega = 0.5 * numbers[r + k * (r + 1)], math.sqrt(abs(numbers[k]))
+        numbers[marks + k] = 0.0
         difference = (delta - omega) * (delta + omega)
         root = math.sqrt(abs(difference))
         if numbers[k] > 0.0 and difference < 0.0 and root > NEARLY_CRITICAL * omega:
@@ -155,7 +179,7 @@ def oscillations(numbers: Numbers, waves: Waves, r: int) -> int:
             waves[place] = complex(1.0, -delta / root)
             waves[place + size] = complex(0.0, -1.0 / root)
             waves[place + 3 * size] = 1.0 + 0j
-            numbers[2 * r + k] = 1.0
+            numbers[marks + k] = 1.0
             count += 1
     return count
 
