@@ -15,7 +15,7 @@ from multiphi_exudyn.levels.level import build_level as building
 from multiphi_exudyn.levels.level import level_rows, static_response
 from multiphi_exudyn.levels.level.build_level import build_level
 from multiphi_exudyn.mathematics.eigenproblems import modes, orthonormal
-from multiphi_exudyn.mathematics.response import free_response, light_damping
+from multiphi_exudyn.mathematics.response import free_response
 
 DAMPINGS = [mp.RayleighDamping(0.5, 1e-5), mp.ModalDamping(0.01)]
 SETS = [(0,), (1,), (0, 1), (0, 1, 3), (0, 2, 3, 4), (3, 4)]
@@ -70,8 +70,7 @@ ENTRIES = [
     (modes, "set_signs"),
     (orthonormal, "largest_error"),
     (orthonormal, "remove_from"),
-    (free_response, "write_oscillations"),
-    (light_damping, "find_pairs"),
+    (free_response, "write_closed_form"),
     (level_records, "write_record"),
     (exits, "fill_signals"),
     (defect_forms, "write_motions"),

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.linalg import expm
 
-from multiphi_exudyn.mathematics.response import light_damping
+from multiphi_exudyn.mathematics.response import free_response, light_damping
 from multiphi_exudyn.mathematics.response.coupled_response import modal_response
-from multiphi_exudyn.mathematics.response.light_damping import lightly_damped
+from multiphi_exudyn.mathematics.response.free_response import lightly_coupled
 
 
 def chain(seed, r, ratio):
@@ -27,7 +27,7 @@ def moved(response, start, t):
 @given(st.integers(0, 2**31), st.integers(1, 8), st.floats(0, 0.03), st.floats(0, 5))
 def test_equals_the_matrix_exponential(seed, r, ratio, t):
     squares, damping = chain(seed, r, ratio)
-    response = lightly_damped(squares, damping)
+    response = lightly_coupled(squares, damping)
     if response is None:
         return
     system = np.block([[np.zeros((r, r)), np.eye(r)], [-np.diag(squares), -damping]])
@@ -38,8 +38,8 @@ def test_equals_the_matrix_exponential(seed, r, ratio, t):
 @pytest.mark.parametrize("ratio", [1e-6, 1e-3, 1e-2])
 def test_is_taken_where_damping_is_light_in_few_steps(monkeypatch, ratio):
     squares, damping = chain(1, 12, ratio)
-    monkeypatch.setattr(light_damping, "MOST_STEPS", 12)
-    monkeypatch.setattr(light_damping, "find_pairs", light_damping.iterate_pairs)  # compiled ones have their own limit
+    monkeypatch.setattr(light_damping, "MOST_STEPS", 12)  # a compiled function has its own limit
+    monkeypatch.setattr(free_response, "write_closed_form", free_response.closed_form)
     response = modal_response(squares, damping)
     assert not response.diagonal
     assert np.array_equal(response.shapes.diagonal(), np.ones(12))
@@ -50,9 +50,9 @@ def test_is_taken_where_damping_is_light_in_few_steps(monkeypatch, ratio):
 
 def test_the_plain_iteration_is_the_compiled_one(monkeypatch):
     squares, damping = chain(3, 9, 1e-3)
-    compiled = lightly_damped(squares, damping)
-    monkeypatch.setattr(light_damping, "find_pairs", light_damping.iterate_pairs)
-    found = lightly_damped(squares, damping)
+    compiled = lightly_coupled(squares, damping)
+    monkeypatch.setattr(free_response, "write_closed_form", free_response.closed_form)
+    found = lightly_coupled(squares, damping)
     for name in ("shapes", "from_displacement", "from_velocity", "from_force"):
         own = getattr(found, name)
         assert_allclose(getattr(compiled, name), own, rtol=0, atol=1e-15 * np.max(np.abs(own)))
@@ -62,15 +62,15 @@ def test_the_plain_iteration_is_the_compiled_one(monkeypatch):
 def test_an_iteration_that_leaves_the_numbers_is_given_up(monkeypatch):
     squares, damping = chain(1, 6, 1e-3)
     start = light_damping.start
-    monkeypatch.setattr(light_damping, "find_pairs", light_damping.iterate_pairs)
+    monkeypatch.setattr(free_response, "write_closed_form", free_response.closed_form)
     monkeypatch.setattr(light_damping, "start", lambda numbers, r: start(numbers, r) or 1)
-    assert lightly_damped(squares, 1e5 * damping) is None
-    assert lightly_damped(squares, np.full_like(damping, np.nan)) is None
+    assert lightly_coupled(squares, 1e5 * damping) is None
+    assert lightly_coupled(squares, np.full_like(damping, np.nan)) is None
 
 
 def test_starts_are_their_own_to_round_off():
     squares, damping = chain(2, 10, 5e-3)
-    response = lightly_damped(squares, damping)
+    response = lightly_coupled(squares, damping)
     places, speeds = response.shapes, response.shapes * response.basis.rates
     for rows, own, other in (
         (places, response.from_displacement, response.from_velocity),
@@ -82,7 +82,7 @@ def test_starts_are_their_own_to_round_off():
 
 def test_modes_far_apart_start_where_they_are_put():
     """Their vectors are known after one step; a rate from before it would start 6e-11 beside."""
-    response = lightly_damped(np.array([6.9, 1.8e8]), np.array([[0.32, 0.12], [0.12, 0.22]]))
+    response = lightly_coupled(np.array([6.9, 1.8e8]), np.array([[0.32, 0.12], [0.12, 0.22]]))
     given = np.array([-0.75, 1.5e-8])
     c = response.from_displacement @ given
     assert_allclose((response.shapes @ c).real, given, rtol=1e-15, atol=1e-20)
@@ -92,7 +92,7 @@ def test_modes_far_apart_start_where_they_are_put():
 @pytest.mark.parametrize("scale", [2.0**-20, 2.0**20])
 def test_units_of_time_change_nothing(scale):
     squares, damping = chain(3, 6, 1e-2)
-    plain, scaled = lightly_damped(squares, damping), lightly_damped(squares * scale**2, damping * scale)
+    plain, scaled = lightly_coupled(squares, damping), lightly_coupled(squares * scale**2, damping * scale)
     assert_allclose(scaled.basis.rates, plain.basis.rates * scale, rtol=1e-15)
     assert_allclose(scaled.shapes, plain.shapes, rtol=1e-15)
 
@@ -102,9 +102,9 @@ def test_what_is_not_light_is_left_to_eigenvalues():
     pairs = np.array([1.0, 1.0, 4.0, 9.0, 16.0])  # of equal frequencies any vector is one
     turned = damping.copy()
     turned[0, 1] *= 1.1
-    assert lightly_damped(squares, damping) is not None
-    assert lightly_damped(pairs, damping) is None
-    assert lightly_damped(np.array([0.0, 1.0, 4.0, 9.0, 16.0]), damping) is None
-    assert lightly_damped(np.array([-1.0, 1.0, 4.0, 9.0, 16.0]), damping) is None
-    assert lightly_damped(squares, 100 * damping) is None
-    assert lightly_damped(squares, turned) is None
+    assert lightly_coupled(squares, damping) is not None
+    assert lightly_coupled(pairs, damping) is None
+    assert lightly_coupled(np.array([0.0, 1.0, 4.0, 9.0, 16.0]), damping) is None
+    assert lightly_coupled(np.array([-1.0, 1.0, 4.0, 9.0, 16.0]), damping) is None
+    assert lightly_coupled(squares, 100 * damping) is None
+    assert lightly_coupled(squares, turned) is None

@@ -24,6 +24,7 @@ Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dyna
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -142,16 +143,17 @@ def modal_projection(target: Level, source: Level) -> np.ndarray:
     considered.
     """
     products: np.ndarray = target.vectors.T @ source.vectors
-    clear_unmixed(products.ravel(), target.omega, source.omega, *products.shape)
+    clear_unmixed(products.ravel(), target.squares, source.squares, *products.shape)
     return products
 
 
 @compiled
-def clear(products: Numbers, omega: Numbers, source: Numbers, rows: int, columns: int) -> None:
-    """Set products (rows, columns) of modes with these omega to zero if they are round-off in both energies."""
+def clear(products: Numbers, target: Numbers, source: Numbers, rows: int, columns: int) -> None:
+    """Set products (rows, columns) of modes with these omega^2 to zero if they are round-off in both energies."""
     for i in range(rows):
         for j in range(columns):
-            share, k = source[j] / omega[i] if omega[i] > source[j] else 1.0, i * columns + j
+            own, other, k = abs(target[i]), abs(source[j]), i * columns + j
+            share = math.sqrt(other / own) if own > other else 1.0
             if abs(products[k]) <= max(PRODUCT, UNMIXED * share):
                 products[k] = 0.0
 

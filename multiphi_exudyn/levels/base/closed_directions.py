@@ -55,7 +55,7 @@ class ClosedDirections:
 
     @property
     def _has_several_rigid(self) -> bool:
-        return int(np.count_nonzero(self.rigid)) > 1
+        return len(self.members) > 1 and int(np.count_nonzero(self.rigid)) > 1
 
     @functools.cached_property
     def _orthogonalised(self) -> tuple[ClosedDirections, np.ndarray]:

@@ -2,6 +2,6 @@
 
 For matrices as NumPy has them, and in flat buffers for the loop of a run.
 
-Order: exponentials, basis_arrays, free_response, light_damping, motion_parts, coupled_response, forced_response,
+Order: exponentials, basis_arrays, light_damping, free_response, motion_parts, coupled_response, forced_response,
 forced_orders, response_arrays, forced_arrays.
 """

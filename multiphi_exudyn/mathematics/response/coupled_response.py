@@ -25,8 +25,13 @@ import scipy.linalg
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.mathematics.response.exponentials import Exponentials
-from multiphi_exudyn.mathematics.response.free_response import Chain, ModalResponse, is_slow, slow_powers, uncoupled
-from multiphi_exudyn.mathematics.response.light_damping import lightly_damped
+from multiphi_exudyn.mathematics.response.free_response import (
+    Chain,
+    ModalResponse,
+    is_slow,
+    lightly_coupled,
+    slow_powers,
+)
 from multiphi_exudyn.mathematics.response.motion_parts import Parts, parts_of
 
 __all__ = ["modal_response"]
@@ -41,8 +46,7 @@ def modal_response(
     """
     if coupling is not None and np.count_nonzero(coupling):
         return _coupled(squares, np.diag(squares) + coupling, damping, duration)
-    response = uncoupled(squares, damping, duration) or lightly_damped(squares, damping)
-    return response or _coupled(squares, np.diag(squares), damping, duration)
+    return lightly_coupled(squares, damping, duration) or _coupled(squares, np.diag(squares), damping, duration)
 
 
 def _coupled(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, duration: float) -> ModalResponse:
@@ -124,18 +128,9 @@ def _slow_motion(
         rows += [start, acceleration, *(weight * rate * acceleration for weight in weights)]
         mixing = np.array([[0.0, 1.0], [0.0, rate]])
         chains.append(Chain(mixing, np.column_stack([drift, shapes[:, k]]), np.stack([np.zeros(r), maps[1, k]])))
-    maps_of_terms, flags = np.stack(rows, axis=1), (np.zeros(r, bool), np.zeros(len(powers), bool))
     basis = Exponentials(np.zeros(len(powers), complex), np.array(powers))
-    return ModalResponse(
-        basis,
-        np.column_stack(columns),
-        maps_of_terms[0],
-        maps_of_terms[1],
-        maps_of_terms[2],
-        False,
-        *flags,
-        tuple(chains),
-    )
+    maps_of_terms = np.concatenate([np.stack(rows, axis=1), np.array(columns)[None]])
+    return ModalResponse(basis, maps_of_terms, np.zeros(r, bool), np.zeros(len(powers), bool), tuple(chains))
 
 
 def _integral(rows: np.ndarray, parts: Parts) -> np.ndarray:
@@ -166,20 +161,10 @@ def _motion_of_parts(parts: Parts, shapes: np.ndarray, maps: np.ndarray) -> Moda
             rows.append(np.einsum("dj,mjr->mdr", raised[:, i], maps[:, part]))
         poles += [False] * (len(raised) * (end - first))
         chains.append(Chain(parts.mixing[part, part], shapes[:, part], maps[1][part]))
-    maps_of_terms = np.concatenate(rows, axis=1) if rows else np.zeros((2, 0, r), complex)
+    maps_of_terms = np.zeros((4, len(rates), r), complex)
+    maps_of_terms[:2], maps_of_terms[3] = np.concatenate(rows, axis=1) if rows else 0.0, shapes[:, columns].T
     basis = Exponentials(np.array(rates, complex), np.array(powers, int))
-    zero = np.zeros_like(maps_of_terms[0])
-    return ModalResponse(
-        basis=basis,
-        shapes=shapes[:, columns],
-        from_displacement=maps_of_terms[0],
-        from_velocity=maps_of_terms[1],
-        from_force=zero,
-        diagonal=False,
-        alone=np.zeros(r, bool),
-        poles=np.array(poles, bool),
-        chains=tuple(chains),
-    )
+    return ModalResponse(basis, maps_of_terms, np.zeros(r, bool), np.array(poles, bool), tuple(chains))
 
 
 def _initial_drift(
@@ -189,7 +174,8 @@ def _initial_drift(
     r, f, a = len(shapes), len(free), len(alone)
     rate_shapes = shapes @ parts.mixing
     modes, unit = np.concatenate([free, np.repeat(alone, 3)]), np.eye(r)
-    maps_of_terms = np.zeros((3, f + 3 * a, r), complex)
+    maps_of_terms = np.zeros((4, f + 3 * a, r), complex)
+    maps_of_terms[3] = unit[modes]
     maps_of_terms[0][:f] = unit[free] - (shapes[free] @ maps[0]).real
     maps_of_terms[1][:f] = -(shapes[free] @ maps[1]).real
     starts = f + 3 * np.arange(a)
@@ -210,10 +196,7 @@ def _initial_drift(
             chains.append(Chain(np.eye(2, k=1, dtype=complex), column, maps_of_terms[1][start : start + 2]))
         else:
             is_alone[mode] = True
-    columns = unit[:, modes].astype(complex)
-    return ModalResponse(
-        basis, columns, maps_of_terms[0], maps_of_terms[1], maps_of_terms[2], False, is_alone, poles, tuple(chains)
-    )
+    return ModalResponse(basis, maps_of_terms, is_alone, poles, tuple(chains))
 
 
 def _sum(one: ModalResponse, other: ModalResponse) -> ModalResponse:
@@ -221,17 +204,8 @@ def _sum(one: ModalResponse, other: ModalResponse) -> ModalResponse:
     basis = Exponentials(
         np.concatenate([one.basis.rates, other.basis.rates]), np.concatenate([one.basis.powers, other.basis.powers])
     )
-    return ModalResponse(
-        basis,
-        np.hstack([one.shapes, other.shapes]),
-        np.vstack([one.from_displacement, other.from_displacement]),
-        np.vstack([one.from_velocity, other.from_velocity]),
-        np.vstack([one.from_force, other.from_force]),
-        False,
-        one.alone | other.alone,
-        np.concatenate([one.poles, other.poles]),
-        one.chains + other.chains,
-    )
+    maps, poles = np.concatenate([one.maps, other.maps], axis=1), np.concatenate([one.poles, other.poles])
+    return ModalResponse(basis, maps, one.alone | other.alone, poles, one.chains + other.chains)
 
 
 def _with_drift(
@@ -252,13 +226,13 @@ def _with_drift(
     drift[free], offset[free], offset[alone] = drift_speed[free], 0.0, 0.0
     powers = np.tile([0, 0, 1], count)  # u, then w t with its derivative w
     basis = Exponentials(np.zeros(3 * count, complex), powers)
-    columns = np.stack([offset, drift, drift], axis=2).reshape(r, 3 * count).astype(complex)
-    maps = np.zeros((3, 3 * count, r), complex)
+    columns = np.stack([offset, drift, drift], axis=2).reshape(r, 3 * count)
+    maps = np.zeros((4, 3 * count, r), complex)
     maps[2][::3, free] = maps[2][2::3, free] = np.eye(count)
-    forced = response.from_force.copy()
-    forced[:, free] -= response.from_displacement @ offset + response.from_velocity @ drift_speed
+    maps[3] = columns.T
+    driven = response.maps.copy()
+    driven[2][:, free] -= response.from_displacement @ offset + response.from_velocity @ drift_speed
     driving = -(stiffness[alone] @ offset + damping[alone] @ drift)  # acceleration of driven modes by the drift
-    forced[:, free] += response.from_force[:, alone] @ driving
-    flags = np.zeros(r, bool), np.zeros(3 * count, bool)
-    drift_response = ModalResponse(basis, columns, maps[0], maps[1], maps[2], False, *flags)
-    return _sum(replace(response, from_force=forced), drift_response)
+    driven[2][:, free] += response.from_force[:, alone] @ driving
+    drift_response = ModalResponse(basis, maps, np.zeros(r, bool), np.zeros(3 * count, bool))
+    return _sum(replace(response, maps=driven), drift_response)

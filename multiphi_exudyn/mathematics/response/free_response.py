@@ -6,7 +6,8 @@
 omega^2 < 0 is a growing mode. D [1/s] is diagonal for proportional damping: then each mode has its own closed
 form (underdamped, overdamped, nearly critical by a Taylor polynomial, zero frequency, growing). A zero-frequency mode
 whose damping is slow compared with the duration of its motion has powers of time instead: exponentials would be large
-terms, of eta' / D and p / D^2, with small differences. Coupled modes are in coupled_response.py. Constant forces on
+terms, of eta' / D and p / D^2, with small differences. Modes that damping couples are in light_damping.py and
+coupled_response.py. Constant forces on
 modes of non-zero frequency belong to the asymptotic configuration, not here.
 """
 
@@ -20,13 +21,14 @@ import numpy as np
 
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, Waves, compiled, entry
 from multiphi_exudyn.mathematics.response.exponentials import Exponentials
+from multiphi_exudyn.mathematics.response.light_damping import iterate_pairs, pair_numbers
 from multiphi_exudyn.mathematics.round_off import SLOW
 
-__all__ = ["Chain", "ModalResponse", "flags", "is_slow", "slow_powers", "uncoupled"]
+__all__ = ["Chain", "ModalResponse", "is_slow", "lightly_coupled", "slow_powers"]
 
 DIAGONAL = 1e-13  # of sqrt(D_ii D_jj): off-diagonal damping below it is round-off of a diagonal matrix
 NEARLY_CRITICAL = 1e-2  # |zeta^2 - 1|^(1/2) below which the Taylor polynomial of degree 5 is more accurate
-COUPLED = -1  # in place of a number of modes
+LIGHT, COUPLED = -1, -2  # in place of a number of modes
 LAST_POWER = 1e-17  # of the first: powers of time below this, in the speed of slow motion, are truncated
 
 
@@ -46,20 +48,37 @@ class Chain:
 class ModalResponse:
     """The closed form of the module's equation.
 
-    basis: the p exponentials. shapes: V (r, p) complex. from_displacement, from_velocity, from_force:
-    A, B, P (p, r) complex. diagonal: whether D was diagonal to round-off. alone: (r,) modes with an equation of
-    their own. In the motion of the other modes poles (p,) marks the exponentials of single poles; chains have the rest.
+    basis: the p exponentials. maps: A, B, P and V^T (4, p, r) complex. alone: (r,) modes with an equation of their own.
+    poles: (p,) in the motion of the other modes marks the exponentials of single poles; chains have the rest. diagonal:
+    whether D was diagonal to round-off.
     """
 
     basis: Exponentials
-    shapes: np.ndarray
-    from_displacement: np.ndarray
-    from_velocity: np.ndarray
-    from_force: np.ndarray
-    diagonal: bool
+    maps: np.ndarray
     alone: np.ndarray
     poles: np.ndarray
     chains: tuple[Chain, ...] = ()
+    diagonal: bool = False
+
+    @property
+    def shapes(self) -> np.ndarray:
+        """V (r, p)."""
+        return self.maps[3].T
+
+    @property
+    def from_displacement(self) -> np.ndarray:
+        """A (p, r)."""
+        return self.maps[0]
+
+    @property
+    def from_velocity(self) -> np.ndarray:
+        """B (p, r)."""
+        return self.maps[1]
+
+    @property
+    def from_force(self) -> np.ndarray:
+        """P (p, r)."""
+        return self.maps[2]
 
     def coefficients(
         self, displacement: np.ndarray, velocity: np.ndarray, force: np.ndarray | None = None
@@ -110,37 +129,64 @@ def slow_powers(rate: complex, duration: float) -> list[complex]:
     return weights
 
 
-def uncoupled(squares: np.ndarray, damping: np.ndarray, duration: float = math.inf) -> ModalResponse | None:
-    """Return the closed form for omega^2 (r,) [rad2/s2], negative for growing modes, and diagonal damping D [1/s].
+def lightly_coupled(squares: np.ndarray, damping: np.ndarray, duration: float = math.inf) -> ModalResponse | None:
+    """Return the closed form of modes that damping does not couple, or lightly (light_damping.py); None of others.
 
-    None where D (r, r) is not diagonal. duration: of the longest motion [s].
+    squares: omega^2 (r,) [rad2/s2], negative for growing modes. damping: D (r, r) [1/s]. duration: of the longest
+    motion [s].
+    """
+    r, powers = len(squares), np.zeros(len(squares), int)
+    numbers = np.concatenate([squares, damping.diagonal(), damping, np.zeros(pair_numbers(r))], axis=None)
+    waves = np.zeros((1 + 4 * r, r), complex)
+    rates, maps = waves[0], waves[1:].reshape(4, r, r)
+    outcome = write_closed_form(numbers, waves.ravel(), r)
+    if outcome == COUPLED:
+        return None
+    if outcome == LIGHT:
+        return ModalResponse(Exponentials(rates, powers), maps, flags(r, False), flags(r, True))
+    if outcome < r:
+        oscillates = numbers[(2 + r) * r :][:r] == 1.0
+        rates, powers, maps = _with_other_modes(squares, numbers[r : 2 * r], rates, maps, oscillates, duration)
+    basis, poles = Exponentials(rates, powers), flags(len(rates), False)
+    return ModalResponse(basis, maps, flags(r, True), poles, diagonal=True)
+
+
+@compiled
+def closed_form(numbers: Numbers, waves: Waves, r: int) -> int:
+    """Write rates and maps of lightly coupled modes, or of those that oscillate if D is diagonal; return their number.
+
+    LIGHT for the former, COUPLED for modes that damping couples more. numbers: omega^2, D_ii (r,), D (r, r), and memory
+    of ``pair_numbers``, zero before. waves: rates (r,) and maps (4, r, r), zero before.
+    """
+    if is_diagonal(numbers, 2 * r, r) == 1:
+        return oscillations(numbers, waves, (2 + r) * r, r)
+    return LIGHT if iterate_pairs(numbers, waves, r) == 1 else COUPLED
+
+
+write_closed_form = entry(closed_form)
+
+
+def _with_other_modes(
+    squares: np.ndarray,
+    damping: np.ndarray,
+    rates: np.ndarray,
+    maps: np.ndarray,
+    oscillates: np.ndarray,
+    duration: float,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return rates, powers and maps of uncoupled modes, of which those with flags (r,) oscillate and are in ``maps``.
+
+    damping: D_ii (r,).
     """
     r, further = len(squares), list[Term]()
-    numbers, waves = np.concatenate([squares, damping, squares], axis=None), np.zeros((1 + 4 * r, r), complex)
-    rates, powers, maps = waves[0], np.zeros(r, int), waves[1:].reshape(4, r, r)
-    count_of_oscillating = write_oscillations(numbers, waves.ravel(), r)
-    if count_of_oscillating == COUPLED:
-        return None
-    if count_of_oscillating < r:
-        oscillates = numbers[r + r * r :] == 1.0
-        for k in np.flatnonzero(~oscillates).tolist():
-            further += _mode_terms(k, float(squares[k]), float(damping[k, k]) / 2, duration)
-        count = int(np.count_nonzero(oscillates))
-        maps = np.concatenate([maps[:, oscillates], np.zeros((4, len(further), r))], axis=1)
-        rates = np.concatenate([rates[oscillates], [rate for _, rate, _, _ in further]])
-        powers = np.array([0] * count + [power for _, _, power, _ in further], int)
-        for at, (k, _, _, weights) in enumerate(further, start=count):
-            maps[:, at, k] = *weights, 1.0
-    return ModalResponse(
-        basis=Exponentials(rates, powers),
-        shapes=maps[3].T,
-        from_displacement=maps[0],
-        from_velocity=maps[1],
-        from_force=maps[2],
-        diagonal=True,
-        alone=flags(r, True),
-        poles=flags(len(rates), False),
-    )
+    for k in np.flatnonzero(~oscillates).tolist():
+        further += _mode_terms(k, float(squares[k]), float(damping[k]) / 2, duration)
+    count = int(np.count_nonzero(oscillates))
+    maps = np.concatenate([maps[:, oscillates], np.zeros((4, len(further), r))], axis=1)
+    for at, (k, _, _, weights) in enumerate(further, start=count):
+        maps[:, at, k] = *weights, 1.0
+    rates = np.concatenate([rates[oscillates], [rate for _, rate, _, _ in further]])
+    return rates, np.array([0] * count + [power for _, _, power, _ in further], int), maps
 
 
 @compiled
@@ -153,24 +199,20 @@ def is_diagonal(damping: Numbers, start: int, r: int) -> int:
         for j in range(r):
             product = damping[start + i * (r + 1)] * damping[start + j * (r + 1)]
             scale = max(math.sqrt(abs(product)), largest * DIAGONAL)
-            if i != j and abs(damping[start + i * r + j]) > DIAGONAL * scale:
+            if i != j and not abs(damping[start + i * r + j]) <= DIAGONAL * scale:
                 return 0
     return 1
 
 
 @compiled
-def oscillations(numbers: Numbers, waves: Waves, r: int) -> int:
-    """Write rates, A, B, P and V^T of the modes that oscillate, each in its place, and mark them; return how many do.
+def oscillations(numbers: Numbers, waves: Waves, marks: int, r: int) -> int:
+    """Write rates and maps of the modes that oscillate, each in its place, and mark them; return how many do.
 
-    COUPLED where D is not diagonal. numbers: omega^2 (r,), D (r, r) and marks (r,), of any value before. waves: rates
-    (r,) and matrices (4, r, r), zero before.
+    numbers: omega^2, D_ii and, further on, marks (r,), zero before. waves: rates (r,) and maps (4, r, r), zero before.
     """
-    count, marks = 0, r + r * r
-    if is_diagonal(numbers, r, r) == 0:
-        return COUPLED
+    count = 0
     for k in range(r):
-        delta, omega = 0.5 * numbers[r + k * (r + 1)], math.sqrt(abs(numbers[k]))
-        numbers[marks + k] = 0.0
+        delta, omega = 0.5 * numbers[r + k], math.sqrt(abs(numbers[k]))
         difference = (delta - omega) * (delta + omega)
         root = math.sqrt(abs(difference))
         if numbers[k] > 0.0 and difference < 0.0 and root > NEARLY_CRITICAL * omega:
@@ -182,9 +224,6 @@ def oscillations(numbers: Numbers, waves: Waves, r: int) -> int:
             numbers[marks + k] = 1.0
             count += 1
     return count
-
-
-write_oscillations = entry(oscillations)
 
 
 @functools.lru_cache(maxsize=64)

@@ -19,13 +19,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
+from multiphi_exudyn.mathematics.compiling.compiled import Numbers, Waves, compiled
 
-from multiphi_exudyn.mathematics.compiling.compiled import Numbers, Waves, compiled, entry
-from multiphi_exudyn.mathematics.response.exponentials import Exponentials
-from multiphi_exudyn.mathematics.response.free_response import ModalResponse, flags
-
-__all__ = ["lightly_damped"]
+__all__ = ["iterate_pairs", "pair_numbers"]
 
 LIGHT = 0.2  # of omega, and of a distance of two modes: larger damping is not light
 SYMMETRIC = 1e-13  # of the largest damping: round-off of a symmetric matrix
@@ -33,28 +29,18 @@ LAST = 2e-16  # of a mode: predicted next step, from the slowest reduction so fa
 MOST_STEPS = 30  # of the iteration; three to ten are typical
 
 
-def lightly_damped(squares: np.ndarray, damping: np.ndarray) -> ModalResponse | None:
-    """Return the closed form for omega^2 (r,) and damping D (r, r); None where D is not symmetric, or not light."""
-    r = len(squares)
-    numbers = np.concatenate([squares, damping.diagonal(), damping, np.zeros((4 * r + 2, r))], axis=None)
-    waves = np.zeros((1 + 4 * r, r), complex)
-    if not find_pairs(numbers, waves.ravel(), r):
-        return None
-    return ModalResponse(
-        basis=Exponentials(waves[0], np.zeros(r, int)),
-        shapes=waves[1 : 1 + r].T,
-        from_displacement=waves[1 + r : 1 + 2 * r],
-        from_velocity=waves[1 + 2 * r : 1 + 3 * r],
-        from_force=waves[1 + 3 * r :],
-        diagonal=False,
-        alone=flags(r, False),
-        poles=flags(r, True),
-    )
+def pair_numbers(r: int) -> int:
+    """Return how many numbers ``iterate_pairs`` takes beside omega^2 and D."""
+    return (4 * r + 2) * r
 
 
 @compiled
 def iterate_pairs(numbers: Numbers, waves: Waves, r: int) -> int:
-    """Iterate v of all pairs until it converges, and write the closed form; return 0 where it does not, else 1."""
+    """Iterate v of all pairs until it converges, and write the closed form; return 0 where it does not, else 1.
+
+    It does not where D is not symmetric, or not light. numbers: omega^2, d (r,), D (r, r), replaced by G; v and G v of
+    all pairs, a row each, (r, r), first real, then imaginary parts; lambda (2, r); those after G are zero before.
+    """
     previous, reduction = 1.0, 0.0
     if start(numbers, r) == 0:
         return 0
@@ -85,11 +71,7 @@ def multiply(numbers: Numbers, r: int) -> None:
 
 @compiled
 def start(numbers: Numbers, r: int) -> int:
-    """Return 1 where damping is symmetric and light for all modes and their distances, and start with v = e_i.
-
-    numbers: omega^2, d (r,), D (r, r), replaced by G; v and G v of all pairs, a row each, (r, r), first real, then
-    imaginary parts; lambda (2, r).
-    """
+    """Return 1 where damping is symmetric and light for all modes and their distances, and start with v = e_i."""
     coupling, vectors, products, largest = 2 * r, (2 + r) * r, (2 + 3 * r) * r, 0.0
     for i in range(r):
         damping = numbers[r + i]
@@ -154,23 +136,20 @@ def improve(numbers: Numbers, r: int) -> float:
 
 @compiled
 def write(numbers: Numbers, waves: Waves, r: int) -> None:
-    """Set lambda (r,), then v of all pairs, and their maps from displacement and velocity, a row each, (r, r)."""
+    """Set lambda (r,), and A, B and V^T of all pairs, a row each, (r, r); P, between the latter two, stays zero."""
     vectors, products, rates = (2 + r) * r, (2 + 3 * r) * r, (2 + 5 * r) * r
     for i in range(r):
         set_rate(numbers, r, i)
         rate, row, theta = complex(numbers[rates + i], numbers[rates + r + i]), i * r, 0j
+        on_displacement, on_velocity, shape = r + row, (1 + r) * r + row, (1 + 3 * r) * r + row
         for j in range(r):
             v = complex(numbers[vectors + row + j], numbers[vectors + r * r + row + j])
             others = complex(numbers[products + row + j], numbers[products + r * r + row + j])
             theta += v * ((2.0 * rate + numbers[r + j]) * v + others)
-            waves[r + row + j] = v
+            waves[shape + j] = v
         weight = theta.conjugate() * (2.0 / (theta.real * theta.real + theta.imag * theta.imag))
         inverse_rate = rate.conjugate() * (-1.0 / (rate.real * rate.real + rate.imag * rate.imag))
         waves[i] = rate
         for j in range(r):
-            on_speed = weight * waves[r + row + j]
-            waves[(1 + r) * r + row + j] = numbers[j] * (inverse_rate * on_speed)
-            waves[(1 + 2 * r) * r + row + j] = on_speed
-
-
-find_pairs = entry(iterate_pairs)
+            waves[on_velocity + j] = weight * waves[shape + j]
+            waves[on_displacement + j] = numbers[j] * (inverse_rate * waves[on_velocity + j])
