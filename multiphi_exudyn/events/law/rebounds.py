@@ -54,7 +54,7 @@ from multiphi_exudyn.events.states.energies import kinetic
 from multiphi_exudyn.events.states.signals import rate_sign, row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.complementarity.free_rows import norm, product
-from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
+from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 
 __all__ = ["clear_last_bounces", "collide_and_rebound", "flag_touching", "repeat_impacts", "set_rebound_speeds"]
 

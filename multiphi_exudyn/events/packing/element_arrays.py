@@ -9,7 +9,7 @@ import numpy as np
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
+from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 from multiphi_exudyn.mechanics.elements.element import friction_spring
 from multiphi_exudyn.mechanics.elements.friction import Friction

@@ -6,6 +6,7 @@ All are in the coordinates xi = (eta, w) of a loaded level, with q >= 0 channels
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.excitation.excitation import Excitation
@@ -19,7 +20,7 @@ __all__ = ["base_parts", "channel_parts", "from_base", "level_numbers", "powers"
 def level_numbers(level: LoadedLevel) -> np.ndarray:
     """Return the numbers that describe a level, as level_writing.py takes them."""
     modal, channels, form, response = level.modal, level.channels, level.potential_form, level.response
-    parts = (
+    parts: tuple[ArrayLike, ...] = (
         [form.constant, level.excitation.highest_frequency, response.basis.unit],
         modal.squares,
         modal.damping.diagonal() / 2,
@@ -31,7 +32,7 @@ def level_numbers(level: LoadedLevel) -> np.ndarray:
         form.linear,
         form.rows,
         form.follows,
-        signal_parts(level),
+        *signal_parts(level),
     )
     return np.concatenate(parts, axis=None)
 

@@ -25,8 +25,7 @@ from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.transition import Transition
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
-from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import remainder_size, remove_direction, without
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import add_direction, remove_direction, without
 
 __all__ = ["DefectForm", "allowed", "defect_form", "factor", "held_rigidly", "over_omega"]
 __all__ += ["start_form", "struck_defects"]
@@ -131,10 +130,17 @@ def map_to_defects(
     c: int,
     project_target: int,
 ) -> None:
-    """Set the columns of both maps, vectors (m,) one after the other; source: modes (n, m), target: (r, m).
+    """Set the columns of both maps, each a vector (m,), one after the other.
 
-    columns: P (y_l - y_m - Psi_m c), P (Psi_l - Psi_m T), in place of Psi_m T, and Psi_m, then the latter two over
-    Omega, then memory (c, m). project_target: whether Psi_m has columns that held links may not allow.
+    source, target: the modes Psi_l (n, m) and Psi_m (r, m). columns, of which those of Psi_m T are there before:
+
+        1 column     P (y_l - y_m - Psi_m c)
+        n columns    P (Psi_l - Psi_m T)
+        r columns    P Psi_m
+        n + r        the latter two over Omega
+        c            memory: unit vectors of the directions of held links, which P removes
+
+    project_target: 0 where held links allow Psi_m, so that P does not change it.
     """
     width, basis = 1 + n + r, (1 + 2 * (n + r)) * m
     for i in range(m):
@@ -148,10 +154,7 @@ def map_to_defects(
         for i in range(m):
             columns[column + i] = source[j * m + i] - columns[column + i]
     for p in range(c):
-        size = remainder_size(links, held[p] * m, lengths[held[p]], columns, basis, basis + p * m, m, p)
-        for i in range(m):  # of one that depends on others nothing is left but round-off
-            columns[basis + p * m + i] *= 1.0 / size if size > INDEPENDENT else 0.0
-        if size > INDEPENDENT:
+        if add_direction(links, held[p] * m, lengths[held[p]], columns, basis, m, p) == 1:
             remove_direction(columns, basis + p * m, columns, 0, m, width if project_target == 1 else 1 + n)
     for j in range(n + r):
         for i in range(m):

@@ -79,7 +79,7 @@ def signal_table(level: LoadedLevel, exits: Sequence[tuple[int, Exit]]) -> np.nd
     """Return the signals s of exits of elements in a level, rows (e, 2 n + 1) of (xi, xi', 1)."""
     own, shares = level.level, ExitShares.of(level.level.base.link_indices, exits)
     table = np.zeros((len(exits), 2 * level.width + 1))
-    held, parts = np.array(own.indices, int), signal_parts(level)
+    held, parts = np.array(own.indices, int), np.concatenate(signal_parts(level), axis=None)
     fill_signals(table.ravel(), parts, held, shares.links, shares.numbers, *own.gap_rows.shape, len(held), len(exits))
     return table
 
@@ -111,10 +111,10 @@ class ExitShares:
         return cls(np.array(firsts + [link for link, _ in shares], int), numbers)
 
 
-def signal_parts(level: LoadedLevel) -> np.ndarray:
+def signal_parts(level: LoadedLevel) -> tuple[np.ndarray, ...]:
     """Return what signals are made of: rows (l, n) and constants (l,) of gaps, rows and constants of forces (k,)."""
     own, forces = level.level, level.asymptotic.forces
-    return np.concatenate([own.gap_rows, level.gap_constants, own.force_rows, own.force_rate_rows, forces], axis=None)
+    return own.gap_rows, level.gap_constants, own.force_rows, own.force_rate_rows, forces
 
 
 @compiled
@@ -135,9 +135,9 @@ def write_signal(
 ) -> None:
     """Set the signal of an exit, a row (2 n + 1,) of (xi, xi', 1) that is zero before.
 
-    parts: ``signal_parts`` from ``start``, of l ``links``; held: the k links that hold, from ``first_held``; exits,
-    shares: ``ExitShares`` of ``count`` exits. A constant that is the difference of a load and a limit is zero if it is
-    round-off of them.
+    parts: ``signal_parts`` one after the other, from ``start``, of l ``links``; held: the k links that hold, from
+    ``first_held``; exits, shares: ``ExitShares`` of ``count`` exits. A constant that is the difference of a load and a
+    limit is zero if it is round-off of them.
     """
     constants, forces = start + links * n, start + links * (n + 1)
     constant, size = shares[exit_], abs(shares[exit_])

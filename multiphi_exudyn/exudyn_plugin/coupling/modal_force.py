@@ -23,7 +23,7 @@ from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.packing.level_arrays import LevelArrays
 from multiphi_exudyn.events.transitions.exits import after, entering_exit, exits_of, force_shares, return_exit
 from multiphi_exudyn.levels.level.level import Level
-from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
+from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 
 __all__ = ["ConstantForces", "Inertia", "LevelForces", "static_shift"]
 

@@ -117,8 +117,8 @@ def _force_row(structure: LinearStructure, link: AnyLink) -> np.ndarray:
 
 
 def _projected_rows(modes: Modes, rows: np.ndarray) -> np.ndarray:
-    """Return rows (l, n) in base coordinates (m, l), with zeros in place of round-off."""
-    return drop_round_off(modes.shapes.T @ rows.T, np.abs(modes.shapes.T) @ np.abs(rows.T))
+    """Return rows (l, n) in base coordinates (m, l), column by column in memory, with zeros in place of round-off."""
+    return drop_round_off(rows @ modes.shapes, np.abs(rows) @ np.abs(modes.shapes)).T
 
 
 def _dense(matrix: Matrix) -> np.ndarray:

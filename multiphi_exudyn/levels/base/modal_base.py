@@ -136,7 +136,7 @@ class ModalBase(ElementTable, Shown):
     def direction_signs(self) -> np.ndarray:
         """Sign (c,) of every contact's direction relative to the first link with that direction (direction_indices)."""
         along = np.sum(self.directions * self.directions[:, self.direction_indices], axis=0)
-        return np.where(along < 0, -1, 1)
+        return np.where(along < 0, -1.0, 1.0)
 
     def pressing(self, element: int) -> dict[int, int]:
         """Return the links of an element without a held place, and the signs of their directions to its own."""

@@ -13,9 +13,9 @@ from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.level.level_modes import level_modes
 from multiphi_exudyn.levels.level.level_rows import level_rows
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
-from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
 from multiphi_exudyn.mathematics.eigenproblems.modes import aligned_clusters
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import remainder_size, scalar_product
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import add_direction, scalar_product
+from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 
 __all__ = ["build_level", "independent"]
 
@@ -129,23 +129,18 @@ def write_following(
     """Set flags of the links that k rigid ones hold; return 0 where these are not independent, else 1.
 
     links: directions (count, m). lengths: of them. scratch: (k + 1) m numbers, first unit vectors of the space of rigid
-    directions. A direction is added, or found to lie in that space, by what two orthogonalisations leave of its unit
-    vector.
+    directions.
     """
     for p in range(k):
-        link = rigid[p]
-        size = remainder_size(links, link * m, lengths[link], scratch, 0, p * m, m, p)
-        if not size > INDEPENDENT:
+        if add_direction(links, rigid[p] * m, lengths[rigid[p]], scratch, 0, m, p) == 0:
             return 0
-        for i in range(m):
-            scratch[p * m + i] /= size
     for link in range(count):
         square = 0.0
         for p in range(k if lengths[link] > 0.0 else 0):
             share = scalar_product(scratch, p * m, links, link * m, m) / lengths[link]
             square += share * share
         flags[link] = 1.0 if lengths[link] == 0.0 else 0.0
-        if square > ALMOST and remainder_size(links, link * m, lengths[link], scratch, 0, k * m, m, k) <= INDEPENDENT:
+        if square > ALMOST and add_direction(links, link * m, lengths[link], scratch, 0, m, k) == 0:
             flags[link] = 1.0
     return 1
 

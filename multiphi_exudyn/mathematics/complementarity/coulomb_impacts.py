@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
+from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 
 __all__ = ["CoulombImpact"]
 

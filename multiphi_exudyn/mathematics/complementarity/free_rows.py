@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
-from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
+from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 
 __all__ = [
     "PROBLEM",

@@ -15,11 +15,10 @@ from __future__ import annotations
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.mathematics.round_off import ZERO
+from multiphi_exudyn.mathematics.round_off import INDEPENDENT, ZERO
 
-__all__ = ["FOLLOWING", "INDEPENDENT", "Infeasible", "least_distance"]
+__all__ = ["FOLLOWING", "Infeasible", "least_distance"]
 
-INDEPENDENT = 1e-10  # of its length: a direction with a smaller remainder beside others depends on them
 FOLLOWING = 10 * INDEPENDENT  # of its terms: allowed violation of an inequality that depends on others
 ALIKE = 1e-10  # of the largest violation: equal ones but for round-off, of which the first enters
 SETS = 20  # tried for every inequality: far fewer are needed

@@ -82,7 +82,7 @@ from multiphi_exudyn.mathematics.complementarity.free_rows import (
     solve_free_rows,
     update_tied_shares,
 )
-from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING, INDEPENDENT, SETS
+from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING, SETS
 from multiphi_exudyn.mathematics.complementarity.row_sides import (
     accept_dependent_row,
     choose_sides,
@@ -91,7 +91,7 @@ from multiphi_exudyn.mathematics.complementarity.row_sides import (
     scale,
     update_violations,
 )
-from multiphi_exudyn.mathematics.round_off import ZERO
+from multiphi_exudyn.mathematics.round_off import INDEPENDENT, ZERO
 
 __all__ = ["EXCLUDED", "PROBLEM", "SOLVED", "UNDECIDED", "lay_out", "pose", "problem_ints", "problem_numbers", "solve"]
 

@@ -47,8 +47,8 @@ from multiphi_exudyn.mathematics.complementarity.free_rows import (
     product,
     project_out,
 )
-from multiphi_exudyn.mathematics.complementarity.least_distance import ALIKE, FOLLOWING, INDEPENDENT
-from multiphi_exudyn.mathematics.round_off import ZERO
+from multiphi_exudyn.mathematics.complementarity.least_distance import ALIKE, FOLLOWING
+from multiphi_exudyn.mathematics.round_off import INDEPENDENT, ZERO
 
 __all__ = ["accept_dependent_row", "choose_sides", "first_change", "most_violated_row", "scale", "update_violations"]
 

@@ -7,8 +7,9 @@ import math
 import numpy as np
 
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
+from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 
-__all__ = ["product_error", "remainder_size", "remove_direction", "scalar_product", "without"]
+__all__ = ["add_direction", "product_error", "remove_direction", "scalar_product", "without"]
 
 
 def without(directions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -52,24 +53,24 @@ def remove_direction(direction: Numbers, first: int, vectors: Numbers, start: in
 
 
 @compiled
-def remainder_size(
-    vectors: Numbers, vector: int, length: float, scratch: Numbers, basis: int, remainder: int, m: int, k: int
-) -> float:
-    """Set the remainder of a unit vector beside k orthonormal ones, and return its length; zero for a zero vector.
+def add_direction(vectors: Numbers, vector: int, length: float, scratch: Numbers, basis: int, m: int, k: int) -> int:
+    """Add a direction to k orthonormal vectors, and return 1; where it depends on them, zeros, and return 0.
 
-    vector: where (m,) of this ``length`` begins. scratch: the k vectors from ``basis`` on, and memory at ``remainder``.
-    Orthogonalised twice, which leaves round-off only.
+    vector: where the direction (m,) of this ``length`` begins. scratch: the k vectors from ``basis`` on, and memory for
+    one more. The direction is orthogonalised twice, which leaves round-off only.
     """
-    if length == 0.0:
-        return 0.0
+    added = basis + k * m
     for i in range(m):
-        scratch[remainder + i] = vectors[vector + i] / length
+        scratch[added + i] = vectors[vector + i] / length if length > 0.0 else 0.0
     for _ in range(2):
         for p in range(k):
-            share = scalar_product(scratch, basis + p * m, scratch, remainder, m)
+            share = scalar_product(scratch, basis + p * m, scratch, added, m)
             for i in range(m):
-                scratch[remainder + i] -= share * scratch[basis + p * m + i]
-    return math.sqrt(scalar_product(scratch, remainder, scratch, remainder, m))
+                scratch[added + i] -= share * scratch[basis + p * m + i]
+    size = math.sqrt(scalar_product(scratch, added, scratch, added, m))
+    for i in range(m):
+        scratch[added + i] *= 1.0 / size if size > INDEPENDENT else 0.0
+    return 1 if size > INDEPENDENT else 0
 
 
 @compiled

@@ -28,8 +28,7 @@ from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.exits import signal_table, state_of
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
-from multiphi_exudyn.mathematics.round_off import CLEAR
+from multiphi_exudyn.mathematics.round_off import CLEAR, INDEPENDENT
 from multiphi_exudyn.mechanics.elements.element import friction_spring
 from multiphi_exudyn.time.segments.segment import Segments
 

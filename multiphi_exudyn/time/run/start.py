@@ -18,8 +18,7 @@ from multiphi_exudyn.events.arrays import CLOSE, IDLE, OPEN, SLIP_FORWARD
 from multiphi_exudyn.events.packing.start_arrays import Start
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mathematics.complementarity.least_distance import INDEPENDENT
-from multiphi_exudyn.mathematics.round_off import drop_round_off
+from multiphi_exudyn.mathematics.round_off import INDEPENDENT, drop_round_off
 from multiphi_exudyn.mechanics.elements.element import friction_spring
 from multiphi_exudyn.time.run.start_projection import StartProjection
 
