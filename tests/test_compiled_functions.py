@@ -479,7 +479,6 @@ print(*sorted(one.function.__name__ for one in compiled._entries))
         "integrate_works",
         "is_far",
         "largest_product_error",
-        "level_hash",
         "map_to_defects",
         "measure",
         "project",

@@ -8,11 +8,8 @@ from __future__ import annotations
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.arrays import Buffers
 from multiphi_exudyn.events.states.maps import level_hash, map_hash
-from multiphi_exudyn.mathematics.compiling.compiled import entry
 
 __all__ = ["LevelTables"]
-
-hash_level = entry(level_hash)
 
 SLOTS = 64  # of a table at first: twice as many as it holds, or more
 
@@ -71,7 +68,8 @@ class LevelTables:
     def _enter_level(self, record: int) -> None:
         ints = self._buffers.ints
         slots = int(ints[a.LEVEL_SLOTS])
-        slot = hash_level(ints, int(ints[record + a.STATES])) % slots
+        states = ints[ints[record + a.STATES] :][: ints[a.ELEMENTS]].tolist()
+        slot = level_hash(states, 0, len(states)) % slots
         while ints[ints[a.LEVELS] + slot]:
             slot = (slot + 1) % slots
         ints[ints[a.LEVELS] + slot] = record

@@ -44,10 +44,10 @@ HASH_MODULUS = 1_000_003  # of keys: products of it with small numbers stay far 
 
 
 @compiled
-def level_hash(ints: Ints, key: int) -> int:
+def level_hash(ints: Ints, key: int, c: int) -> int:
     """Return the hash of a key (c,)."""
     value = 0
-    for i in range(ints[ELEMENTS]):
+    for i in range(c):
         value = (31 * value + ints[key + i] + 1) % HASH_MODULUS
     return value
 
@@ -62,7 +62,7 @@ def map_hash(source: int, target: int) -> int:
 def find_level(ints: Ints, key: int) -> int:
     """Return the level with a key (c,); NEED if it has not been packed."""
     c, slots = ints[ELEMENTS], ints[LEVEL_SLOTS]
-    slot = level_hash(ints, key) % slots
+    slot = level_hash(ints, key, c) % slots
     while ints[ints[LEVELS] + slot] != 0:
         level = ints[ints[LEVELS] + slot]
         states = ints[level + STATES]

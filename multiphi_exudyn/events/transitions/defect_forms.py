@@ -100,14 +100,13 @@ def _motions(transition: Transition, matrix: np.ndarray, held: set[int]) -> tupl
     before, after = transition.source, transition.target
     source, target, base = before.level.vectors, after.level.vectors, after.level.base
     (m, n), r, c = source.shape, target.shape[1], len(held)
-    width = 1 + n + r
+    width, changes_target = 1 + n + r, before.excitation.channels > 0 or held != held_rigidly(after)
     columns = np.empty(((2 * width - 1) + c, m))  # one after the other, as factors are formed of them
     np.dot(matrix.T, target.T, out=columns[1 : n + 1])
     write_motions(
-        base.link_numbers, base.lengths, np.array(sorted(held), int), np.ascontiguousarray(source.T).ravel(),
+        base.link_numbers, np.array(sorted(held), int), np.ascontiguousarray(source.T).ravel(),
         np.ascontiguousarray(target.T).ravel(), transition.offset, before.asymptotic.configuration,
-        after.asymptotic.configuration, base.periods, columns.ravel(), m, n, r, c,
-        int(before.excitation.channels > 0 or held != held_rigidly(after)),
+        after.asymptotic.configuration, columns.ravel(), m, n, r, c, len(base.links), int(changes_target),
     )  # fmt: skip
     return columns[:width], columns[width : 2 * width - 1]
 
@@ -115,24 +114,24 @@ def _motions(transition: Transition, matrix: np.ndarray, held: set[int]) -> tupl
 @compiled
 def map_to_defects(
     links: Numbers,
-    lengths: Numbers,
     held: Ints,
     source: Numbers,
     target: Numbers,
     offset: Numbers,
     rest: Numbers,
     rest_after: Numbers,
-    periods: Numbers,
     columns: Numbers,
     m: int,
     n: int,
     r: int,
     c: int,
-    project_target: int,
+    count: int,
+    changes_target: int,
 ) -> None:
     """Set the columns of both maps, each a vector (m,), one after the other.
 
-    source, target: the modes Psi_l (n, m) and Psi_m (r, m). columns, of which those of Psi_m T are there before:
+    links: ``ModalBase.link_numbers``, of ``count`` links. source, target: the modes Psi_l (n, m) and Psi_m (r, m).
+    columns, of which those of Psi_m T are there before:
 
         1 column     P (y_l - y_m - Psi_m c)
         n columns    P (Psi_l - Psi_m T)
@@ -140,9 +139,10 @@ def map_to_defects(
         n + r        the latter two over Omega
         c            memory: unit vectors of the directions of held links, which P removes
 
-    project_target: 0 where held links allow Psi_m, so that P does not change it.
+    changes_target: 0 where held links allow Psi_m, so that P does not change it.
     """
-    width, basis = 1 + n + r, (1 + 2 * (n + r)) * m
+    width, basis, lengths = 1 + n + r, (1 + 2 * (n + r)) * m, count * (m + 2)
+    periods = lengths + count + m
     for i in range(m):
         columns[i] = rest[i] - rest_after[i]
     for k in range(r):
@@ -154,11 +154,11 @@ def map_to_defects(
         for i in range(m):
             columns[column + i] = source[j * m + i] - columns[column + i]
     for p in range(c):
-        if add_direction(links, held[p] * m, lengths[held[p]], columns, basis, m, p) == 1:
-            remove_direction(columns, basis + p * m, columns, 0, m, width if project_target == 1 else 1 + n)
+        if add_direction(links, held[p] * m, links[lengths + held[p]], columns, basis, m, p) == 1:
+            remove_direction(columns, basis + p * m, columns, 0, m, width if changes_target == 1 else 1 + n)
     for j in range(n + r):
         for i in range(m):
-            columns[(width + j) * m + i] = columns[(1 + j) * m + i] * periods[i]
+            columns[(width + j) * m + i] = columns[(1 + j) * m + i] * links[periods + i]
 
 
 @compiled

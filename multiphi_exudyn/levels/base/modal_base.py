@@ -124,8 +124,12 @@ class ModalBase(ElementTable, Shown):
 
     @functools.cached_property
     def link_numbers(self) -> np.ndarray:
-        """Directions (l, m), gaps and ``springs`` (l,), and ``squares`` (m,), one after the other."""
-        return np.concatenate([self.directions.T, self.gaps, self.springs, self.squares], axis=None)
+        """What equilibria and defects take of links, one after the other.
+
+        Directions (l, m), gaps, ``springs`` and ``lengths`` (l,), ``squares`` and ``periods`` (m,).
+        """
+        parts = self.directions.T, self.gaps, self.springs, self.lengths, self.squares, self.periods
+        return np.concatenate(parts, axis=None)
 
     @functools.cached_property
     def direction_indices(self) -> list[int]:

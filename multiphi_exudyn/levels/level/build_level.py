@@ -114,34 +114,33 @@ def _following(base: ModalBase, rigid: Sequence[int]) -> np.ndarray:
 
 def _flags_of_following(base: ModalBase, rigid: Sequence[int]) -> np.ndarray | None:
     """Return ``_following`` as numbers, None where the rigid links are not independent."""
-    links, m, flags = len(base.links), base.modes.count, np.zeros(len(base.links))
-    if len(rigid) > m:
+    links, m, k = len(base.links), base.modes.count, len(rigid)
+    if k > m:
         return None
-    scratch = np.empty((len(rigid) + 1) * m)
-    found = set_following(base.link_numbers, base.lengths, np.array(rigid, int), flags, scratch, m, links, len(rigid))
-    return flags if found else None
+    numbers = np.empty((k + 1) * m + links)
+    found = set_following(base.link_numbers, np.array(rigid, int), numbers, m, links, k)
+    return numbers[(k + 1) * m :] if found else None
 
 
 @compiled
-def write_following(
-    links: Numbers, lengths: Numbers, rigid: Ints, flags: Numbers, scratch: Numbers, m: int, count: int, k: int
-) -> int:
+def write_following(links: Numbers, rigid: Ints, numbers: Numbers, m: int, count: int, k: int) -> int:
     """Set flags of the links that k rigid ones hold; return 0 where these are not independent, else 1.
 
-    links: directions (count, m). lengths: of them. scratch: (k + 1) m numbers, first unit vectors of the space of rigid
-    directions.
+    links: ``ModalBase.link_numbers``, of ``count`` links. numbers: unit vectors (k, m) of the space of rigid directions
+    and memory (m,), then the flags (count,).
     """
+    lengths, flags = count * (m + 2), (k + 1) * m
     for p in range(k):
-        if add_direction(links, rigid[p] * m, lengths[rigid[p]], scratch, 0, m, p) == 0:
+        if add_direction(links, rigid[p] * m, links[lengths + rigid[p]], numbers, 0, m, p) == 0:
             return 0
     for link in range(count):
-        square = 0.0
-        for p in range(k if lengths[link] > 0.0 else 0):
-            share = scalar_product(scratch, p * m, links, link * m, m) / lengths[link]
+        length, square = links[lengths + link], 0.0
+        for p in range(k if length > 0.0 else 0):
+            share = scalar_product(numbers, p * m, links, link * m, m) / length
             square += share * share
-        flags[link] = 1.0 if lengths[link] == 0.0 else 0.0
-        if square > ALMOST and add_direction(links, link * m, lengths[link], scratch, 0, m, k) == 0:
-            flags[link] = 1.0
+        numbers[flags + link] = 1.0 if length == 0.0 else 0.0
+        if square > ALMOST and add_direction(links, link * m, length, numbers, 0, m, k) == 0:
+            numbers[flags + link] = 1.0
     return 1
 
 

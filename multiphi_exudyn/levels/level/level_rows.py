@@ -178,10 +178,9 @@ def write_reactions(
     is_rigid, weights, residual = omega_squares + m + 2 * links, r, r + m
     for j in range(r):
         square, smallest = abs(squares[j]), math.inf
-        for i in range(m):
-            total = base[omega_squares + i] + square
-            if 0.0 < total < smallest:
-                smallest = total
+        for i in range(m if square == 0.0 else 0):
+            if 0.0 < base[omega_squares + i] < smallest:
+                smallest = base[omega_squares + i]
         for i in range(m):
             total = base[omega_squares + i] + square
             scratch[weights + i] = 1.0 / (total if total > 0.0 else (smallest if smallest < math.inf else 1.0))

@@ -120,7 +120,7 @@ def write_gaps_and_strain(links: Numbers, y: Numbers, gaps: Numbers, closed: Int
     links: ``ModalBase.link_numbers``, of ``count`` links.
     """
     energy, constants = 0.0, count * m
-    springs, squares = constants + count, constants + 2 * count
+    springs, squares = constants + count, constants + 3 * count
     for link in range(count):
         gap = links[constants + link]
         size = abs(gap)
