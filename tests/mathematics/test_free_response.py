@@ -184,3 +184,9 @@ class TestExponentialIntegrals:
         t = (panels[:-1, None] + duration / 24 * (nodes + 1) / 2).ravel()
         values = np.tile(weights * duration / 48, 24) * t**power * np.exp(rate * t)
         assert abs(found - np.sum(values)) <= 1e-9 * np.sum(np.abs(values)) + 1e-14
+
+
+@pytest.mark.parametrize("damping", [np.full((2, 2), np.nan), np.diag([np.inf, 0.0])])
+def test_damping_that_is_not_finite_is_a_failure_with_its_cause(damping):
+    with pytest.raises(NumericalFailure, match="damping of a level is not finite"):
+        modal_response(np.array([1.0, 4.0]), damping)

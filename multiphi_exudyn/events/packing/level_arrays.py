@@ -34,7 +34,7 @@ __all__ = ["LevelArrays"]
 
 ARRAY_BYTES = 2**29  # of a model's arrays under all loads: half of what a model may keep (level_store.py)
 FEWEST_LEVELS = 8  # are kept whatever their size: a run that alternates between a few would pack them at every event
-NONE = np.zeros(0)
+NO_NUMBERS = np.zeros(0)
 ROOM = 1024  # segments, and events, that the loop records before the run copies them
 
 
@@ -154,7 +154,7 @@ class LevelArrays:
         """The decisions so far, and the contents of the ring."""
         decisions = int(self.buffers.ints[a.DECISIONS])
         if not decisions:
-            return 0, NONE
+            return 0, NO_NUMBERS
         count = 2 * min(decisions, int(self.buffers.ints[a.WINDOW]) + 1)
         return decisions, self.buffers.numbers[self._ring : self._ring + count].copy()
 
@@ -300,7 +300,7 @@ class LevelArrays:
 
     def _map(self, source: int, target: int) -> int:
         """Pack the map between two levels and return its record."""
-        level, sizes, terms, transition = self._loaded_in(target), NONE, None, None
+        level, sizes, terms, transition = self._loaded_in(target), NO_NUMBERS, None, None
         if source == self.base:
             matrix, offset, rate_matrix, sizes = from_base(level)
         else:
@@ -314,5 +314,5 @@ class LevelArrays:
         return self.buffers.put("ints", [matrix_at, offset_at, matrix_at if is_one_map else rate_at, -1, *further])
 
     def _defects(self, transition: Transition | None, level: LoadedLevel) -> np.ndarray | None:
-        """Return the form of the defect of a transition, None for one from the base; None if there is none."""
+        """Return the form of the defect of a transition, or of a start if that is None; None if there is no form."""
         return start_form(level) if transition is None else defect_form(transition, ()).factors

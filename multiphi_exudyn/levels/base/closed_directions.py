@@ -43,7 +43,7 @@ class ClosedDirections:
 
         The small difference of nearly parallel directions would be lost in round-off. Q has their unit of length.
         """
-        return self._orthogonalised[0] if self._has_several_rigid else self  # not kept: no reference to itself
+        return self._orthogonalised[0] if self._has_several_rigid else self  # if kept, it would delay its own release
 
     def from_orthogonal(self, forces: np.ndarray) -> np.ndarray:
         """Return forces (d,) along these directions from those along the orthogonal ones."""

@@ -175,10 +175,13 @@ class _Buffer:
 
     def from_param(self, array: Any) -> ctypes.Array[ctypes.c_char]:
         """Return where an array begins; ctypes refuses one that is not contiguous, or not writable."""
+        if not isinstance(array, np.ndarray) or array.dtype != self._dtype:
+            raise self._refused(array)
         try:
-            if array.dtype != self._dtype:
-                raise TypeError
-            return NO_BYTES.from_buffer(array)
-        except (AttributeError, TypeError) as error:
-            got = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
-            raise MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}") from error
+            return NO_BYTES.from_buffer(array)  # type: ignore[arg-type]
+        except TypeError as error:
+            raise self._refused(array) from error
+
+    def _refused(self, array: Any) -> MultiPhiTypeError:
+        got = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
+        return MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}")

@@ -42,7 +42,8 @@ def modal_response(
 ) -> ModalResponse:
     """Return the closed form for omega^2 (r,) [rad2/s2], damping D [1/s] and coupling S - diag(omega^2) (r, r).
 
-    duration: of the longest motion [s]. Raises NumericalFailure where rates are not distinct by more than round-off.
+    duration: of the longest motion [s]. Raises NumericalFailure where rates are not distinct by more than round-off,
+    and for coupled modes whose matrices are not finite.
     """
     if coupling is not None and np.count_nonzero(coupling):
         return _coupled(squares, np.diag(squares) + coupling, damping, duration)
@@ -50,6 +51,8 @@ def modal_response(
 
 
 def _coupled(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, duration: float) -> ModalResponse:
+    if not (np.isfinite(stiffness).all() and np.isfinite(damping).all()):
+        raise NumericalFailure("modes: stiffness or damping of a level is not finite")
     moving = np.flatnonzero(np.any(stiffness, axis=0) | np.any(damping, axis=0))
     elastic = moving[squares[moving] != 0]
     scale = np.sqrt(np.abs(squares[elastic]))

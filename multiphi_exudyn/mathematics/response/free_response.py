@@ -7,8 +7,7 @@ omega^2 < 0 is a growing mode. D [1/s] is diagonal for proportional damping: the
 form (underdamped, overdamped, nearly critical by a Taylor polynomial, zero frequency, growing). A zero-frequency mode
 whose damping is slow compared with the duration of its motion has powers of time instead: exponentials would be large
 terms, of eta' / D and p / D^2, with small differences. Modes that damping couples are in light_damping.py and
-coupled_response.py. Constant forces on
-modes of non-zero frequency belong to the asymptotic configuration, not here.
+coupled_response.py. Constant forces on modes of non-zero frequency belong to the asymptotic configuration, not here.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ __all__ = ["Chain", "ModalResponse", "is_slow", "lightly_coupled", "slow_powers"
 
 DIAGONAL = 1e-13  # of sqrt(D_ii D_jj): off-diagonal damping below it is round-off of a diagonal matrix
 NEARLY_CRITICAL = 1e-2  # |zeta^2 - 1|^(1/2) below which the Taylor polynomial of degree 5 is more accurate
-LIGHT, COUPLED = -1, -2  # in place of a number of modes
+LIGHTLY_COUPLED, COUPLED = -1, -2  # in place of a number of modes
 LAST_POWER = 1e-17  # of the first: powers of time below this, in the speed of slow motion, are truncated
 
 
@@ -49,7 +48,7 @@ class ModalResponse:
     """The closed form of the module's equation.
 
     basis: the p exponentials. maps: A, B, P and V^T (4, p, r) complex. alone: (r,) modes with an equation of their own.
-    poles: (p,) in the motion of the other modes marks the exponentials of single poles; chains have the rest. diagonal:
+    In the motion of the other modes poles (p,) marks the exponentials of single poles; chains have the rest. diagonal:
     whether D was diagonal to round-off.
     """
 
@@ -130,7 +129,7 @@ def slow_powers(rate: complex, duration: float) -> list[complex]:
 
 
 def lightly_coupled(squares: np.ndarray, damping: np.ndarray, duration: float = math.inf) -> ModalResponse | None:
-    """Return the closed form of modes that damping does not couple, or lightly (light_damping.py); None of others.
+    """Return the closed form of modes that damping does not couple, or lightly (light_damping.py); None for others.
 
     squares: omega^2 (r,) [rad2/s2], negative for growing modes. damping: D (r, r) [1/s]. duration: of the longest
     motion [s].
@@ -142,7 +141,7 @@ def lightly_coupled(squares: np.ndarray, damping: np.ndarray, duration: float = 
     outcome = write_closed_form(numbers, waves.ravel(), r)
     if outcome == COUPLED:
         return None
-    if outcome == LIGHT:
+    if outcome == LIGHTLY_COUPLED:
         return ModalResponse(Exponentials(rates, powers), maps, flags(r, False), flags(r, True))
     if outcome < r:
         oscillates = numbers[(2 + r) * r :][:r] == 1.0
@@ -153,14 +152,15 @@ def lightly_coupled(squares: np.ndarray, damping: np.ndarray, duration: float = 
 
 @compiled
 def closed_form(numbers: Numbers, waves: Waves, r: int) -> int:
-    """Write rates and maps of lightly coupled modes, or of those that oscillate if D is diagonal; return their number.
+    """Write rates and maps of the modes that oscillate, if D is diagonal, and return how many do.
 
-    LIGHT for the former, COUPLED for modes that damping couples more. numbers: omega^2, D_ii (r,), D (r, r), and memory
-    of ``pair_numbers``, zero before. waves: rates (r,) and maps (4, r, r), zero before.
+    Or write those of all modes, and return LIGHTLY_COUPLED; or return COUPLED, for modes that damping couples more.
+    numbers: omega^2, D_ii (r,), D (r, r), and memory of ``pair_numbers``, zero before. waves: rates (r,) and maps
+    (4, r, r), zero before.
     """
     if is_diagonal(numbers, 2 * r, r) == 1:
         return oscillations(numbers, waves, (2 + r) * r, r)
-    return LIGHT if iterate_pairs(numbers, waves, r) == 1 else COUPLED
+    return LIGHTLY_COUPLED if iterate_pairs(numbers, waves, r) == 1 else COUPLED
 
 
 write_closed_form = entry(closed_form)

@@ -30,7 +30,7 @@ MOST_STEPS = 30  # of the iteration; three to ten are typical
 
 
 def pair_numbers(r: int) -> int:
-    """Return how many numbers ``iterate_pairs`` takes beside omega^2 and D."""
+    """Return how many numbers ``iterate_pairs`` takes beside omega^2, d and D."""
     return (4 * r + 2) * r
 
 
