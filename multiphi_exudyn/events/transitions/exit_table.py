@@ -5,6 +5,7 @@ The exits of a level are those of the states of its elements, in the order of th
 
 from __future__ import annotations
 
+import itertools
 import operator
 from collections.abc import Sequence
 
@@ -41,7 +42,7 @@ class ExitTable:
 
     def count(self, states: Sequence[int]) -> int:
         """Return the number of exits of elements in these states."""
-        return sum(map(operator.getitem, self._counts, states))
+        return sum(itertools.starmap(operator.getitem, zip(self._counts, states, strict=True)))
 
     def turning(self, states: Sequence[int]) -> list[tuple[int, int, Exit]]:
         """Return the exits in these states whose requested state depends on a velocity: their numbers and elements."""

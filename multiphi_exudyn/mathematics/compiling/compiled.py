@@ -174,14 +174,8 @@ class _Buffer:
         self._dtype = dtype
 
     def from_param(self, array: Any) -> ctypes.Array[ctypes.c_char]:
-        """Return where an array begins; ctypes refuses one that is not contiguous, or not writable."""
-        if not isinstance(array, np.ndarray) or array.dtype != self._dtype:
-            raise self._refused(array)
-        try:
-            return NO_BYTES.from_buffer(array)  # type: ignore[arg-type]
-        except TypeError as error:
-            raise self._refused(array) from error
-
-    def _refused(self, array: Any) -> MultiPhiTypeError:
-        got = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
-        return MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}")
+        """Return where an array begins."""
+        if not (isinstance(array, np.ndarray) and array.flags.carray and array.dtype == self._dtype):
+            got = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
+            raise MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}")
+        return NO_BYTES.from_buffer(array)  # type: ignore[arg-type]

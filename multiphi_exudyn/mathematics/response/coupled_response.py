@@ -33,6 +33,7 @@ from multiphi_exudyn.mathematics.response.free_response import (
     slow_powers,
 )
 from multiphi_exudyn.mathematics.response.motion_parts import Parts, parts_of
+from multiphi_exudyn.mathematics.round_off import all_finite
 
 __all__ = ["modal_response"]
 
@@ -51,7 +52,7 @@ def modal_response(
 
 
 def _coupled(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, duration: float) -> ModalResponse:
-    if not (np.isfinite(stiffness).all() and np.isfinite(damping).all()):
+    if not (all_finite(stiffness.ravel()) and all_finite(damping.ravel())):
         raise NumericalFailure("modes: stiffness or damping of a level is not finite")
     moving = np.flatnonzero(np.any(stiffness, axis=0) | np.any(damping, axis=0))
     elastic = moving[squares[moving] != 0]
