@@ -13,7 +13,7 @@ from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.level.level_modes import level_modes
 from multiphi_exudyn.levels.level.level_rows import level_rows
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
-from multiphi_exudyn.mathematics.eigenproblems.modes import aligned_clusters
+from multiphi_exudyn.mathematics.eigenproblems.modes import aligned_clusters, cluster_end
 from multiphi_exudyn.mathematics.eigenproblems.orthonormal import add_direction, scalar_product
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 
@@ -25,30 +25,30 @@ ALMOST = 0.99  # of a direction's square: with a smaller part in the span of oth
 
 
 def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = None) -> Level:
-    """Return the level with these contacts closed and at least its lowest ``modes`` modes, all of them for None."""
+    """Return the level with these contacts closed and at least its lowest ``modes`` modes, all of them for None.
+
+    Its last mode ends a cluster of modes of one frequency.
+    """
     closed = list(indices)
     closed_directions = base.closed_at(indices)
     following = _following(base, [i for i in closed if base.links[i].rigid])
     orthogonal = closed_directions.orthogonal
-    squares, vectors, accuracy = level_modes(base, orthogonal, modes)
     rigid_body = _rigid_body_modes(base, orthogonal)
-    if rigid_body:
-        squares[np.argsort(np.abs(squares), kind="stable")[:rigid_body]] = 0.0
-    if accuracy:
-        squares[np.abs(squares) <= NEUTRAL * accuracy] = 0.0
+    squares, vectors, accuracy, kept = _lowest_modes(base, orthogonal, modes, rigid_body)
+    neutral = vectors[:, :0]
     if not (is_vibrating := np.count_nonzero(squares) == len(squares)):
         squares, vectors = _aligned_free_modes(base, squares, vectors, closed)
+        zero = squares == 0
+        neutral = vectors[:, zero] if np.count_nonzero(zero) > rigid_body else neutral
+    squares, vectors = squares[:kept], vectors[:, :kept]
     stiffnesses = closed_directions.stiffness.tolist()
     rows = level_rows(base, closed, stiffnesses, squares, vectors, following, accuracy, check=is_vibrating)
     if rows is None:
         squares, vectors = aligned_clusters(squares, vectors, *base.observed_rows)
         rows = level_rows(base, closed, stiffnesses, squares, vectors, following, accuracy, check=False)
     assert rows is not None, "it is None only where clusters are checked"
-    neutral = rows.vectors[:, :0]
     if not is_vibrating:
-        zero = squares == 0
-        _drop_damping_of_free_modes(base, closed, zero, rows.damping)
-        neutral = rows.vectors[:, zero] if np.count_nonzero(zero) > rigid_body else neutral
+        _drop_damping_of_free_modes(base, closed, squares == 0, rows.damping)
     return Level(
         closed=tuple(base.links[i].name for i in closed if i not in base.laws),
         indices=indices,
@@ -65,6 +65,27 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
         computed=squares,
         kept_beyond=0,
     )
+
+
+def _lowest_modes(
+    base: ModalBase, closed_directions: ClosedDirections, modes: int | None, rigid_body: int
+) -> tuple[np.ndarray, np.ndarray, float, int]:
+    """Return ``level_modes``, with omega^2 = 0 of zero-frequency modes, and how many of them end with a cluster.
+
+    All are kept where a method gives all.
+    """
+    most, beyond = base.modes.count - int(np.count_nonzero(closed_directions.rigid)), 1
+    while True:
+        requested = modes + beyond if modes is not None and modes + beyond < most else None
+        squares, vectors, accuracy = level_modes(base, closed_directions, requested)
+        if rigid_body:
+            squares[np.argsort(np.abs(squares), kind="stable")[:rigid_body]] = 0.0
+        if accuracy:
+            squares[np.abs(squares) <= NEUTRAL * accuracy] = 0.0
+        kept = len(squares) if modes is None or len(squares) >= most else cluster_end(squares, modes)
+        if kept is not None:
+            return squares, vectors, accuracy, kept
+        beyond *= 2
 
 
 def _aligned_free_modes(

@@ -12,7 +12,6 @@ stiffness of a force law may be negative, and the level indefinite: then omega^2
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -32,7 +31,7 @@ from multiphi_exudyn.levels.level.static_response import (
     response_of_neutral_level,
     static_response,
 )
-from multiphi_exudyn.mathematics.eigenproblems.modes import NEAR
+from multiphi_exudyn.mathematics.eigenproblems.modes import cluster_end
 from multiphi_exudyn.mathematics.response.coupled_response import modal_response
 from multiphi_exudyn.mathematics.response.free_response import ModalResponse, is_slow
 from multiphi_exudyn.mathematics.round_off import ZERO
@@ -215,15 +214,11 @@ class Level(Shown):
             return self.response
         return modal_response(self.squares, self.damping_matrix, self.coupling, duration)
 
-    def apart(self, modes: int) -> int | None:
-        """Return the least number of modes >= ``modes`` that cut no cluster of one frequency, None if not built."""
-        squares = self.squares[modes - 1 :].tolist()
-        steps = enumerate(itertools.pairwise(squares), start=modes)
-        return next((count for count, (lower, upper) in steps if upper - lower > NEAR * abs(upper)), None)
-
     def truncated(self, count: int) -> Level:
-        """Return the same level with its lowest ``count`` modes, and those that complete a cluster (``apart``)."""
-        modes = self.apart(count) or self.modes
+        """Return the same level with its lowest ``count`` modes, and those that complete a cluster of one frequency."""
+        modes = cluster_end(self.squares, count) or self.modes
+        if (modes, modes - count) == (self.modes, self.kept_beyond):
+            return self
         return Level(
             closed=self.closed,
             indices=self.indices,

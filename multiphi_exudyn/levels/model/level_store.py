@@ -74,11 +74,9 @@ class LevelStore:
         if levels is None:
             levels = self._levels = BoundedCache(self.cache_capacity(modes))
         most = base.modes.count - sum(base.links[i].rigid for i in indices)
-        needed, level, extra = min(modes, most), levels.find(indices), 1
-        while level is None or (level.modes < most and (level.modes < needed or level.apart(needed) is None)):
-            requested = needed + extra
-            level = levels.keep(indices, build_level(base, indices, requested if requested < most else None))
-            extra *= 2
+        level = levels.find(indices)
+        if level is None or level.modes < min(modes, most):
+            level = levels.keep(indices, build_level(base, indices, modes if modes < most else None))
         return level
 
     def outside(self, row: np.ndarray) -> float:

@@ -34,6 +34,7 @@ __all__ = [
     "align_signs",
     "aligned_clusters",
     "aligned_modes",
+    "cluster_end",
     "complete_modes",
     "has_clusters",
     "largest_ratio",
@@ -140,6 +141,15 @@ def aligned_clusters(
         cluster = shapes[:, first:last] @ rotation
         shapes[:, first:last] = np.where(np.abs(cluster) <= ROTATED * lengths, 0.0, cluster)
     return squares, shapes
+
+
+def cluster_end(squares: np.ndarray, count: int) -> int | None:
+    """Return the least number of modes >= ``count`` that parts no cluster; None where the last omega^2 (r,) are one.
+
+    squares: omega^2 [rad2/s2], ascending.
+    """
+    steps = enumerate(itertools.pairwise(squares[count - 1 :].tolist()), start=count)
+    return next((end for end, (lower, upper) in steps if upper - lower > NEAR * abs(upper)), None)
 
 
 @compiled
