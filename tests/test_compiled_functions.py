@@ -491,11 +491,11 @@ print(*sorted(one.function.__name__ for one in compiled._entries))
         "single_direction_response",
         "step_is_clear",
         "unfold",
-        "write_following",
         "write_gaps_and_strain",
         "write_level",
         "write_rows",
         "write_signals",
+        "write_span",
     ]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.modal_base import ModalBase
-from multiphi_exudyn.levels.level.build_level import independent
+from multiphi_exudyn.levels.level.following import independent
 from multiphi_exudyn.levels.level.static_response import static_response
 
 __all__ = ["static_response_with_friction"]

@@ -9,19 +9,17 @@ import numpy as np
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.base.modal_base import ModalBase
+from multiphi_exudyn.levels.level.following import independent
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.level.level_modes import level_modes
 from multiphi_exudyn.levels.level.level_rows import level_rows
-from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.eigenproblems.modes import aligned_clusters, cluster_end
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import add_direction, scalar_product
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 
-__all__ = ["build_level", "independent"]
+__all__ = ["build_level"]
 
 UNDAMPED = 1e-12  # of the largest damping: round-off of projecting it
 NEUTRAL = 1e-12  # of mu: an |omega^2| below it is round-off of zero
-ALMOST = 0.99  # of a direction's square: with a smaller part in the span of others it is independent of them
 
 
 def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = None) -> Level:
@@ -31,7 +29,10 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     """
     closed = list(indices)
     closed_directions = base.closed_at(indices)
-    following = _following(base, [i for i in closed if base.links[i].rigid])
+    rigid = [i for i in closed if base.links[i].rigid]
+    if not independent(base, rigid):
+        names = ", ".join(base.links[i].name for i in rigid)
+        raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
     orthogonal = closed_directions.orthogonal
     rigid_body = _rigid_body_modes(base, orthogonal)
     squares, vectors, accuracy, kept = _lowest_modes(base, orthogonal, modes, rigid_body)
@@ -42,10 +43,10 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
         neutral = vectors[:, zero] if np.count_nonzero(zero) > rigid_body else neutral
     squares, vectors = squares[:kept], vectors[:, :kept]
     stiffnesses = closed_directions.stiffness.tolist()
-    rows = level_rows(base, closed, stiffnesses, squares, vectors, following, accuracy, check=is_vibrating)
+    rows = level_rows(base, closed, stiffnesses, squares, vectors, accuracy, check=is_vibrating)
     if rows is None:
         squares, vectors = aligned_clusters(squares, vectors, *base.observed_rows)
-        rows = level_rows(base, closed, stiffnesses, squares, vectors, following, accuracy, check=False)
+        rows = level_rows(base, closed, stiffnesses, squares, vectors, accuracy, check=False)
     assert rows is not None, "it is None only where clusters are checked"
     if not is_vibrating:
         _drop_damping_of_free_modes(base, closed, squares == 0, rows.damping)
@@ -57,7 +58,7 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
         vectors=rows.vectors,
         damping=rows.damping,
         gap_rows=rows.gaps,
-        following=following,
+        following=rows.following,
         speed_rows=rows.gaps,
         force_rows=rows.forces,
         force_rate_rows=rows.force_rates,
@@ -115,57 +116,6 @@ def _drop_damping_of_free_modes(base: ModalBase, closed: Sequence[int], free: np
     """
     negligible = np.abs(damping) <= UNDAMPED * base.largest_damping(closed)
     damping[negligible & (free[:, None] | free[None, :])] = 0.0
-
-
-def independent(base: ModalBase, rigid: Sequence[int]) -> bool:
-    """Return whether the directions of these rigid contacts are linearly independent: they can be closed together."""
-    return _flags_of_following(base, rigid) is not None
-
-
-def _following(base: ModalBase, rigid: Sequence[int]) -> np.ndarray:
-    """Return for every link (l,) whether these independent rigid ones keep its gap constant."""
-    if not len(rigid):
-        return base.unmoved
-    flags = _flags_of_following(base, rigid)
-    if flags is None:
-        names = ", ".join(base.links[i].name for i in rigid)
-        raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
-    return np.asarray(flags != 0)
-
-
-def _flags_of_following(base: ModalBase, rigid: Sequence[int]) -> np.ndarray | None:
-    """Return ``_following`` as numbers, None where the rigid links are not independent."""
-    links, m, k = len(base.links), base.modes.count, len(rigid)
-    if k > m:
-        return None
-    numbers = np.empty((k + 1) * m + links)
-    found = set_following(base.link_numbers, np.array(rigid, int), numbers, m, links, k)
-    return numbers[(k + 1) * m :] if found else None
-
-
-@compiled
-def write_following(links: Numbers, rigid: Ints, numbers: Numbers, m: int, count: int, k: int) -> int:
-    """Set flags of the links that k rigid ones hold; return 0 where these are not independent, else 1.
-
-    links: ``ModalBase.link_numbers``, of ``count`` links. numbers: unit vectors (k, m) of the space of rigid directions
-    and memory (m,), then the flags (count,).
-    """
-    lengths, flags = count * (m + 2), (k + 1) * m
-    for p in range(k):
-        if add_direction(links, rigid[p] * m, links[lengths + rigid[p]], numbers, 0, m, p) == 0:
-            return 0
-    for link in range(count):
-        length, square = links[lengths + link], 0.0
-        for p in range(k if length > 0.0 else 0):
-            share = scalar_product(numbers, p * m, links, link * m, m) / length
-            square += share * share
-        numbers[flags + link] = 1.0 if length == 0.0 else 0.0
-        if square > ALMOST and add_direction(links, link * m, length, numbers, 0, m, k) == 0:
-            numbers[flags + link] = 1.0
-    return 1
-
-
-set_following = entry(write_following)
 
 
 def _rigid_body_modes(base: ModalBase, closed_directions: ClosedDirections) -> int:

@@ -18,6 +18,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.modal_base import INTERLACING, ModalBase
+from multiphi_exudyn.levels.level.following import write_following, write_span
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.eigenproblems.modes import align_signs, has_clusters
 from multiphi_exudyn.mathematics.eigenproblems.orthonormal import scalar_product
@@ -31,13 +32,17 @@ SCRATCH = 3  # vectors of a least squares solution, beside its columns
 
 @dataclass(frozen=True)
 class LevelRows:
-    """Modes of unique signs (m, r), D (r, r), rows of gaps (l, r), of forces from eta and from eta' (k, r)."""
+    """Modes of unique signs (m, r), D (r, r), rows of gaps (l, r), of forces from eta and from eta' (k, r).
+
+    following: whether the closed rigid links alone determine the gap of each link (l,).
+    """
 
     vectors: np.ndarray
     damping: np.ndarray
     gaps: np.ndarray
     forces: np.ndarray
     force_rates: np.ndarray
+    following: np.ndarray
 
 
 def level_rows(
@@ -46,27 +51,26 @@ def level_rows(
     stiffnesses: list[float],
     squares: np.ndarray,
     vectors: np.ndarray,
-    following: np.ndarray,
     accuracy: float,
     check: bool,
 ) -> LevelRows | None:
     """Return the rows of a level of omega^2 (r,) and modes (m, r); None where omega^2 are equal, if this is checked.
 
-    stiffnesses: of all closed directions. following: links (l,) whose gaps are constant. accuracy: mu, which limits
-    that of omega^2. Raises NumericalFailure for omega^2 that violate the interlacing theorem.
+    closed: links, of which rigid ones are independent. stiffnesses: of all closed directions. accuracy: mu, which
+    limits that of omega^2. Raises NumericalFailure for omega^2 that violate the interlacing theorem.
     """
     (m, r), links, k = vectors.shape, len(base.links), len(closed)
-    c = sum(base.links[i].rigid for i in closed)
+    rigid = [i for i in closed if base.links[i].rigid]
+    c = len(rigid)
     numbers, modes = np.empty(r * (links + r + 2 * k)), np.array(vectors.T, order="C")
     values, damping = numbers[: r * links].reshape(links, r), numbers[r * links : r * (links + r)].reshape(r, r)
     np.matmul(base.directions.T, vectors, out=values)
     damped = np.ascontiguousarray(base.damped(vectors, closed).T)
     np.matmul(modes, damped.T, out=damping)
     scratch = np.empty(r + (SCRATCH + c) * m + c * (c + 1) + links)
-    scratch[len(scratch) - links :] = following
     stiffening, softening = sum(each > 0 for each in stiffnesses), sum(each < 0 for each in stiffnesses)
     outcome = fill_rows(
-        base.level_numbers, squares, modes.ravel(), damped.ravel(), numbers, np.array(closed, int), scratch,
+        base.level_numbers, squares, modes.ravel(), damped.ravel(), numbers, np.array(closed + rigid, int), scratch,
         m, r, len(base.points), links, k, c, stiffening, softening, INTERLACING * accuracy, int(check),
     )  # fmt: skip
     if outcome == VIOLATED:
@@ -74,8 +78,8 @@ def level_rows(
             "level: its modes are not accurate (interlacing violated); are units and magnitudes of mass and stiffness "
             "right?"
         )
-    forces = numbers[r * (links + r) :].reshape(2, k, r)
-    return LevelRows(modes.T, damping, values, forces[0], forces[1]) if outcome == DONE else None
+    forces, following = numbers[r * (links + r) :].reshape(2, k, r), scratch[len(scratch) - links :] != 0.0
+    return LevelRows(modes.T, damping, values, forces[0], forces[1], following) if outcome == DONE else None
 
 
 @compiled
@@ -101,8 +105,8 @@ def write_rows(
     """Make the signs of modes (r, m) unique, and write all rows; return whether this is DONE, or why not.
 
     base: ``ModalBase.level_numbers``. damped: C_l psi (r, m). numbers: gaps (l, r), D (r, r), forces (2, k, r), the
-    first two for modes of any sign. closed: numbers of the k closed links, of which c are rigid. scratch: signs (r,),
-    memory, and at the end flags of links whose gaps are constant.
+    first two for modes of any sign. closed: numbers of the k closed links, then of the c rigid ones. scratch: signs
+    (r,), memory, and at the end flags of links that rigid ones hold.
     """
     observed, damping = links + points, r * links
     lengths, below = observed + m, observed + m + links
@@ -117,6 +121,8 @@ def write_rows(
             numbers[damping + i * r + j] *= scratch[i] * scratch[j]
         for j in range(m if scratch[i] < 0.0 else 0):
             damped[i * m + j] = -damped[i * m + j]
+    write_span(base, rows, lengths, closed, k, scratch, r, m, c)
+    write_following(base, rows, lengths, scratch, r, following, m, links, c)
     for i in range(links):
         for j in range(r):
             if abs(numbers[i * r + j]) <= ZERO * base[lengths + i] or scratch[following + i] == 1.0:
