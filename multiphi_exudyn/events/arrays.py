@@ -45,9 +45,6 @@ of an element, and the states, exits and channels of its friction, are data alon
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Sequence
-
 import numpy as np
 
 __all__ = ["Buffers"]
@@ -252,11 +249,3 @@ class Buffers:
         start = self.take(name, len(flat))
         getattr(self, name)[start : start + len(flat)] = flat
         return start
-
-    def put_parts(self, name: str, parts: Sequence[np.ndarray | None]) -> list[int]:
-        """Append parts to the buffer ``name``, and return their offsets, -1 for None."""
-        given = [part for part in parts if part is not None]
-        start = self.put(name, np.concatenate(given, axis=None))
-        sizes = [0 if part is None else part.size for part in parts]
-        ends = itertools.accumulate(sizes, initial=start)
-        return [-1 if part is None else end for part, end in zip(parts, ends, strict=False)]

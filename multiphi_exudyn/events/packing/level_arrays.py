@@ -310,8 +310,10 @@ class LevelArrays:
         is_one_map = rate_matrix is matrix or np.array_equal(rate_matrix, matrix)
         defects = self._defects(transition, level) if self.ints[a.JUDGED] else None
         parts = matrix, offset, None if is_one_map else rate_matrix, sizes, terms, defects
-        matrix_at, offset_at, rate_at, *further = self.buffers.put_parts("numbers", parts)
-        return self.buffers.put("ints", [matrix_at, offset_at, matrix_at if is_one_map else rate_at, -1, *further])
+        put = self.buffers.put
+        places = (-1 if part is None else put("numbers", part) for part in parts)
+        matrix_at, offset_at, rate_at, *further = places
+        return put("ints", [matrix_at, offset_at, matrix_at if is_one_map else rate_at, -1, *further])
 
     def _defects(self, transition: Transition | None, level: LoadedLevel) -> np.ndarray | None:
         """Return the form of the defect of a transition, or of a start if that is None; None if there is no form."""

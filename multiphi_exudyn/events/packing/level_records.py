@@ -47,7 +47,8 @@ def put_level(buffers: Buffers, level: LoadedLevel, number: int, exits: ExitTabl
     (links, n), r, p, powers = own.gap_rows.shape, modal.modes, len(response.basis.rates), response.basis.powers
     sizes = number, r, n - r, p, links, len(own.indices), len(exits.described), kept, len(form.follows)
     described = [*sizes, _put_chains(buffers, response), *level.states, *own.indices]
-    rates, _ = buffers.put_parts("waves", (response.basis.rates, response.maps))
+    rates = buffers.put("waves", response.basis.rates)
+    buffers.put("waves", response.maps)  # right behind
     rated = int(exits.rated or np.count_nonzero(own.force_rate_rows) > 0)
     signals = buffers.take("waves", kept * (1 + rated) * p)
     ints, numbers = record_sizes(len(level.states), r, n - r, p, links, kept, len(form.follows))

@@ -266,7 +266,7 @@ class ModalBase(ElementTable, Shown):
 
         The forces of springs of one direction follow from their gaps; a rigid contact among them has the remainder.
         """
-        if closed_directions.members == tuple((i,) for i in closed):
+        if closed_directions.members == tuple(zip(closed)):
             return np.asarray(self.direction_signs[closed] * along)
         forces = np.zeros(len(self.links))
         for members, force in zip(closed_directions.members, along.tolist(), strict=True):

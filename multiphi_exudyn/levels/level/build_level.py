@@ -35,7 +35,7 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
         raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
     orthogonal = closed_directions.orthogonal
     rigid_body = _rigid_body_modes(base, orthogonal)
-    squares, vectors, accuracy, kept = _lowest_modes(base, orthogonal, modes, rigid_body)
+    squares, vectors, accuracy, kept = _lowest_modes(base, orthogonal, modes, len(rigid), rigid_body)
     neutral = vectors[:, :0]
     if not (is_vibrating := np.count_nonzero(squares) == len(squares)):
         squares, vectors = _aligned_free_modes(base, squares, vectors, closed)
@@ -69,13 +69,13 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
 
 
 def _lowest_modes(
-    base: ModalBase, closed_directions: ClosedDirections, modes: int | None, rigid_body: int
+    base: ModalBase, closed_directions: ClosedDirections, modes: int | None, constraints: int, rigid_body: int
 ) -> tuple[np.ndarray, np.ndarray, float, int]:
     """Return ``level_modes``, with omega^2 = 0 of zero-frequency modes, and how many of them end with a cluster.
 
     All are kept where a method gives all.
     """
-    most, beyond = base.modes.count - int(np.count_nonzero(closed_directions.rigid)), 1
+    most, beyond = base.modes.count - constraints, 1
     while True:
         requested = modes + beyond if modes is not None and modes + beyond < most else None
         squares, vectors, accuracy = level_modes(base, closed_directions, requested)

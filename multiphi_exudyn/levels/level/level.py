@@ -216,9 +216,9 @@ class Level(Shown):
 
     def truncated(self, count: int) -> Level:
         """Return the same level with its lowest ``count`` modes, and those that complete a cluster of one frequency."""
-        modes = cluster_end(self.squares, count) or self.modes
-        if (modes, modes - count) == (self.modes, self.kept_beyond):
+        if count == self.modes - self.kept_beyond:
             return self
+        modes = cluster_end(self.squares, count) or self.modes
         return Level(
             closed=self.closed,
             indices=self.indices,
