@@ -115,11 +115,10 @@ class ModalBase(ElementTable, Shown):
         """What rows of a level depend on, one after the other (level_rows.py).
 
         Sizes of ``observed_rows`` (k + m,), ``lengths`` (l,), ``square_bounds`` (2, m), ``squares`` (m,), ``restoring``
-        (2, l), whether links are rigid (l,), and ``observed_rows`` (k, m), those of links first.
+        (2, l), and ``observed_rows`` (k, m), those of links first.
         """
         rows, sizes = self.observed_rows
-        rigid = [link.rigid for link in self.links]
-        parts = sizes, self.lengths, *self.square_bounds, self.squares, self.restoring, rigid, rows
+        parts = sizes, self.lengths, *self.square_bounds, self.squares, self.restoring, rows
         return np.concatenate(parts, axis=None)
 
     @functools.cached_property

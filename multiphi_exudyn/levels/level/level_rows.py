@@ -60,17 +60,18 @@ def level_rows(
     limits that of omega^2. Raises NumericalFailure for omega^2 that violate the interlacing theorem.
     """
     (m, r), links, k = vectors.shape, len(base.links), len(closed)
-    rigid = [i for i in closed if base.links[i].rigid]
-    c = len(rigid)
+    places = [p for p, i in enumerate(closed) if base.links[i].rigid]
+    c = len(places)
     numbers, modes = np.empty(r * (links + r + 2 * k)), np.array(vectors.T, order="C")
     values, damping = numbers[: r * links].reshape(links, r), numbers[r * links : r * (links + r)].reshape(r, r)
     np.matmul(base.directions.T, vectors, out=values)
     damped = np.ascontiguousarray(base.damped(vectors, closed).T)
     np.matmul(modes, damped.T, out=damping)
-    scratch = np.empty(r + (SCRATCH + c) * m + c * (c + 1) + links)
+    scratch = np.empty(r + (SCRATCH + c) * m + c * c + links)
     stiffening, softening = sum(each > 0 for each in stiffnesses), sum(each < 0 for each in stiffnesses)
+    described = np.array(closed + [closed[p] for p in places] + places, int)
     outcome = fill_rows(
-        base.level_numbers, squares, modes.ravel(), damped.ravel(), numbers, np.array(closed + rigid, int), scratch,
+        base.level_numbers, squares, modes.ravel(), damped.ravel(), numbers, described, scratch,
         m, r, len(base.points), links, k, c, stiffening, softening, INTERLACING * accuracy, int(check),
     )  # fmt: skip
     if outcome == VIOLATED:
@@ -105,12 +106,12 @@ def write_rows(
     """Make the signs of modes (r, m) unique, and write all rows; return whether this is DONE, or why not.
 
     base: ``ModalBase.level_numbers``. damped: C_l psi (r, m). numbers: gaps (l, r), D (r, r), forces (2, k, r), the
-    first two for modes of any sign. closed: numbers of the k closed links, then of the c rigid ones. scratch: signs
-    (r,), memory, and at the end flags of links that rigid ones hold.
+    first two for modes of any sign. closed: numbers of the k closed links, of the c rigid ones, and places of these
+    among the closed ones. scratch: signs (r,), memory, and at the end flags of links that rigid ones hold.
     """
     observed, damping = links + points, r * links
     lengths, below = observed + m, observed + m + links
-    rows, following = below + 3 * m + 3 * links, r + (SCRATCH + c) * m + c * (c + 1)
+    rows, following = below + 3 * m + 2 * links, r + (SCRATCH + c) * m + c * c
     if check == 1 and has_clusters(squares, r) == 1:
         return CLUSTERED
     align_signs(modes, base, numbers, base, rows, scratch, m, r, links, points)
@@ -177,11 +178,11 @@ def write_reactions(
     k: int,
     c: int,
 ) -> None:
-    """Write the reactions of the c rigid links among k closed ones; those of springs are there.
+    """Write the reactions of the c rigid links among k closed ones; those of springs are there. Overwrites ``damped``.
 
     A weight of zero Omega^2 and omega^2 is the largest other one of its mode.
     """
-    is_rigid, weights, residual = omega_squares + m + 2 * links, r, r + m
+    directions, weights, residual = omega_squares + m + 2 * links, r, r + m
     for j in range(r):
         square, smallest = abs(squares[j]), math.inf
         for i in range(m if square == 0.0 else 0):
@@ -192,61 +193,67 @@ def write_reactions(
             scratch[weights + i] = 1.0 / (total if total > 0.0 else (smallest if smallest < math.inf else 1.0))
             scratch[residual + i] = (base[omega_squares + i] - squares[j]) * modes[j * m + i]
         for p in range(k):
-            force, direction = numbers[forces + p * r + j], is_rigid + links + closed[p] * m
+            force, direction = numbers[forces + p * r + j], directions + closed[p] * m
             for i in range(m if force != 0.0 else 0):
                 scratch[residual + i] -= base[direction + i] * force
-        fit(base, numbers, closed, scratch, forces + j, is_rigid, m, r, links, k, c)
-        for i in range(m):
-            scratch[weights + i] = 1.0
-            scratch[residual + i] = damped[j * m + i]
-        fit(base, numbers, closed, scratch, forces + k * r + j, is_rigid, m, r, links, k, c)
+        fit(base, directions, closed, k, scratch, r, scratch, residual, numbers, forces + j, m, r, c, 1)
+    for i in range(m):
+        scratch[weights + i] = 1.0
+    fit(base, directions, closed, k, scratch, r, damped, 0, numbers, forces + k * r, m, r, c, r)
 
 
 @compiled
 def fit(
     base: Numbers,
-    numbers: Numbers,
+    directions: int,
     closed: Ints,
+    first: int,
     scratch: Numbers,
-    result: int,
-    is_rigid: int,
+    weights: int,
+    residuals: Numbers,
+    start: int,
+    result: Numbers,
+    place: int,
     m: int,
     r: int,
-    links: int,
-    k: int,
     c: int,
+    count: int,
 ) -> None:
-    """Set the coefficients of rigid directions that fit a residual best, at ``result`` in steps of r.
+    """Set the coefficients of c rigid directions that fit each residual (count, m) best, by Gram-Schmidt.
 
-    By Gram-Schmidt orthogonalisation in the weighted product. scratch, after r numbers: weights and residual (m,),
-    memory for a weighted column (m,), columns (c, m) and a triangle (c, c + 1).
+    closed: from ``first`` on the numbers of the rigid links, then the rows, of r, in which their coefficients begin at
+    ``place``. directions: where those of all links begin. The residuals are overwritten. scratch, from ``weights`` on:
+    weights (m,), memory for a residual and a weighted column (m,), columns (c, m) and a triangle (c, c).
     """
-    residual, weighted, columns, triangle, q = r + m, r + 2 * m, r + 3 * m, r + (SCRATCH + c) * m, 0
-    for p in range(k):
-        if base[is_rigid + closed[p]] == 1.0:
-            for i in range(m):
-                scratch[columns + q * m + i] = base[is_rigid + links + closed[p] * m + i]
-            q += 1
+    weighted, columns = weights + 2 * m, weights + SCRATCH * m
+    triangle = columns + c * m
     for p in range(c):
-        column, row = columns + p * m, triangle + p * (c + 1)
+        direction = directions + closed[first + p] * m
         for i in range(m):
-            scratch[weighted + i] = scratch[r + i] * scratch[column + i]
+            scratch[columns + p * m + i] = base[direction + i]
+    for p in range(c):
+        column = columns + p * m
+        for i in range(m):
+            scratch[weighted + i] = scratch[weights + i] * scratch[column + i]
         square = scalar_product(scratch, weighted, scratch, column, m)
-        for q in range(p + 1, c + 1):
-            other = columns + q * m if q < c else residual
-            scratch[row + q] = scalar_product(scratch, weighted, scratch, other, m) / square
-            for i in range(m if p + 1 < c else 0):
-                scratch[other + i] -= scratch[row + q] * scratch[column + i]
-    for p in range(c - 1, -1, -1):
         for q in range(p + 1, c):
-            scratch[triangle + p * (c + 1) + c] -= (
-                scratch[triangle + p * (c + 1) + q] * scratch[triangle + q * (c + 1) + c]
-            )
-    q = 0
-    for p in range(k):
-        if base[is_rigid + closed[p]] == 1.0:
-            numbers[result + p * r] = scratch[triangle + q * (c + 1) + c]
-            q += 1
+            other = columns + q * m
+            share = scalar_product(scratch, weighted, scratch, other, m) / square
+            scratch[triangle + p * c + q] = share
+            for i in range(m):
+                scratch[other + i] -= share * scratch[column + i]
+        for q in range(count):
+            other = start + q * m
+            share = scalar_product(scratch, weighted, residuals, other, m) / square
+            result[place + closed[first + c + p] * r + q] = share
+            for i in range(m if p + 1 < c else 0):
+                residuals[other + i] -= share * scratch[column + i]
+    for p in range(c - 1, -1, -1):
+        row = place + closed[first + c + p] * r
+        for q in range(p + 1, c):
+            other, share = place + closed[first + c + q] * r, scratch[triangle + p * c + q]
+            for j in range(count):
+                result[row + j] -= share * result[other + j]
 
 
 fill_rows = entry(write_rows)

@@ -20,6 +20,7 @@ from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import absolute_product, scalar_product
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT, ZERO, drop_round_off
 
 __all__ = ["Asymptotic", "gaps_and_strain", "response_of_neutral_level", "static_response"]
@@ -122,12 +123,8 @@ def write_gaps_and_strain(links: Numbers, y: Numbers, gaps: Numbers, closed: Int
     energy, constants = 0.0, count * m
     springs, squares = constants + count, constants + 3 * count
     for link in range(count):
-        gap = links[constants + link]
-        size = abs(gap)
-        for i in range(m):
-            term = links[link * m + i] * y[i]
-            gap += term
-            size += abs(term)
+        gap = links[constants + link] + scalar_product(links, link * m, y, 0, m)
+        size = abs(links[constants + link]) + absolute_product(links, link * m, y, 0, m)
         tolerance = FOLLOWING if gaps[link] == 1.0 else ZERO
         gaps[link] = gap if abs(gap) > tolerance * size else 0.0
     for i in range(m):

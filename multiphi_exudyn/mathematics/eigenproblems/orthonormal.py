@@ -9,7 +9,7 @@ import numpy as np
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 
-__all__ = ["add_direction", "product_error", "remove_direction", "scalar_product", "without"]
+__all__ = ["absolute_product", "add_direction", "product_error", "remove_direction", "scalar_product", "without"]
 
 
 def without(directions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -38,6 +38,20 @@ def scalar_product(a: Numbers, first: int, b: Numbers, second: int, m: int) -> f
         sum_3 += a[first + i + 3] * b[second + i + 3]
     for i in range(m - m % 4, m):
         sum_0 += a[first + i] * b[second + i]
+    return (sum_0 + sum_1) + (sum_2 + sum_3)
+
+
+@compiled
+def absolute_product(a: Numbers, first: int, b: Numbers, second: int, m: int) -> float:
+    """Return the sum of the absolute terms of ``scalar_product``, which bounds its round-off."""
+    sum_0, sum_1, sum_2, sum_3 = 0.0, 0.0, 0.0, 0.0
+    for i in range(0, m - 3, 4):
+        sum_0 += abs(a[first + i] * b[second + i])
+        sum_1 += abs(a[first + i + 1] * b[second + i + 1])
+        sum_2 += abs(a[first + i + 2] * b[second + i + 2])
+        sum_3 += abs(a[first + i + 3] * b[second + i + 3])
+    for i in range(m - m % 4, m):
+        sum_0 += abs(a[first + i] * b[second + i])
     return (sum_0 + sum_1) + (sum_2 + sum_3)
 
 

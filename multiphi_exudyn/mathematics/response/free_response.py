@@ -135,7 +135,8 @@ def lightly_coupled(squares: np.ndarray, damping: np.ndarray, duration: float = 
     motion [s].
     """
     r, powers = len(squares), np.zeros(len(squares), int)
-    numbers = np.concatenate([squares, damping.diagonal(), damping, np.zeros(pair_numbers(r))], axis=None)
+    numbers = np.zeros((2 + r) * r + pair_numbers(r))
+    numbers[:r], numbers[r : 2 * r], numbers[2 * r : (2 + r) * r] = squares, damping.diagonal(), damping.ravel()
     waves = np.zeros((1 + 4 * r, r), complex)
     rates, maps = waves[0], waves[1:].reshape(4, r, r)
     outcome = write_closed_form(numbers, waves.ravel(), r)
