@@ -48,7 +48,7 @@ TYPES: dict[Any, np.dtype] = {
     Waves: np.dtype(complex),
 }
 SCALARS: dict[Any, Any] = {int: ctypes.c_int64, float: ctypes.c_double, NoneType: None}
-NO_BYTES = ctypes.c_char * 0  # at an address
+start_of = (ctypes.c_char * 0).from_buffer  # where a contiguous, writable buffer begins; others are refused
 
 _one_at_a_time = threading.RLock()  # numba and LLVM are not thread-safe
 _entries: list[Entry] = []
@@ -175,7 +175,11 @@ class _Buffer:
 
     def from_param(self, array: Any) -> ctypes.Array[ctypes.c_char]:
         """Return where an array begins."""
-        if not (isinstance(array, np.ndarray) and array.flags.carray and array.dtype == self._dtype):
-            got = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
-            raise MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}")
-        return NO_BYTES.from_buffer(array)  # type: ignore[arg-type]
+        try:
+            dtype = array.dtype
+            if (dtype is self._dtype or dtype == self._dtype) and array.flags.aligned:
+                return start_of(array)
+        except (AttributeError, TypeError):  # no array, or no such buffer
+            pass
+        got = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
+        raise MultiPhiTypeError(f"got {got}, need a contiguous, writable array of {self._dtype}")
