@@ -237,6 +237,11 @@ def test_an_entry_keeps_no_array_alive():
         (np.zeros(8)[::2], "float64"),
         ([1.0, 2.0], "list"),
         (np.broadcast_to(1.0, 3), "float64"),
+        (np.asfortranarray(np.zeros((2, 3))), "float64"),
+        (np.frombuffer(bytearray(25), offset=1), "float64"),  # not aligned
+        (np.zeros(3, ">f8"), ">f8"),
+        (np.float64(1.0), "float64"),
+        (bytearray(8), "bytearray"),
     ],
 )
 def test_an_entry_refuses_what_is_no_buffer_of_its_kind(argument, got):
