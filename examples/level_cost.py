@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import statistics
 import time
 from collections.abc import Sequence
 
@@ -76,7 +75,7 @@ def costs(model: mp.MultiPhiModel) -> list[list[float]]:
 
 
 def main(rounds: int = ROUNDS) -> dict[str, list[float]]:
-    """Medians [ms] up to each of the ``STEPS`` by contact and damping; cases alternate."""
+    """Medians [ms] up to each of the ``STEPS`` by contact and damping, printed with lowest tenths; cases alternate."""
     cases = {
         f"{contact}, {damping}": (STIFFNESSES[contact], DAMPINGS[damping])
         for contact, damping in itertools.product(STIFFNESSES, DAMPINGS)
@@ -86,10 +85,11 @@ def main(rounds: int = ROUNDS) -> dict[str, list[float]]:
         for name, case in cases.items():
             new = costs(cantilever(*case))
             rows[name] += new[1:] if number else []  # the first one warms the base, the first round all code
-    medians = {name: [statistics.median(column) for column in zip(*given, strict=True)] for name, given in rows.items()}
+    medians = {name: np.median(given, axis=0).tolist() for name, given in rows.items()}
     for name, found in medians.items():
-        shown = ", ".join(f"{step} {value:.3f}" for step, value in zip(STEPS, found, strict=True))
-        print(f"{name:27s} up to {shown} ms; before {BEFORE}")
+        lowest = np.percentile(rows[name], 10, axis=0).tolist()
+        shown = (f"{step} {value:.2f} ({low:.2f})" for step, value, low in zip(STEPS, found, lowest, strict=True))
+        print(f"{name:27s} up to {', '.join(shown)} ms; before {BEFORE}")
     return medians
 
 

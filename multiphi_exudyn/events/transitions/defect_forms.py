@@ -23,7 +23,7 @@ from scipy.linalg.lapack import dgeqrf
 
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.transition import Transition
-from multiphi_exudyn.levels.base.modal_base import ModalBase
+from multiphi_exudyn.levels.base.modal_base import LENGTHS, SQUARES, ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.eigenproblems.orthonormal import add_direction, remove_direction, without
 
@@ -141,8 +141,8 @@ def map_to_defects(
 
     changes_target: 0 where held links allow Psi_m, so that P does not change it.
     """
-    width, basis, lengths = 1 + n + r, (1 + 2 * (n + r)) * m, count * (m + 2)
-    periods = lengths + count + m
+    width, basis = 1 + n + r, (1 + 2 * (n + r)) * m
+    lengths, periods = count * (m + LENGTHS), count * (m + SQUARES) + m
     for i in range(m):
         columns[i] = rest[i] - rest_after[i]
     for k in range(r):

@@ -28,13 +28,14 @@ from multiphi_exudyn.mechanics.elements.element import Element
 from multiphi_exudyn.mechanics.elements.element_table import ElementTable
 from multiphi_exudyn.mechanics.structures.arguments import Matrix
 
-__all__ = ["ModalBase", "parallel"]
+__all__ = ["GAPS", "LENGTHS", "SPRINGS", "SQUARES", "ModalBase", "parallel"]
 
 PARALLEL = 1e-14  # of the largest component: directions that differ by less differ by round-off
 INTERLACING = 1e-8  # relative violation of the interlacing theorem that is still round-off
 EPSILON = float(np.finfo(float).eps)
 CLOSED_SETS = 8  # of contacts, whose directions are cached: a level needs them when it is built and when it is loaded
 CANCELLED = 1e-13  # of sum |k|: a total stiffness of a force law below it is round-off of zero
+GAPS, SPRINGS, LENGTHS, SQUARES = range(4)  # numbers of links, in their order (``ModalBase.link_numbers``)
 
 
 @dataclass(frozen=True, repr=False)
@@ -125,7 +126,8 @@ class ModalBase(ElementTable, Shown):
     def link_numbers(self) -> np.ndarray:
         """What equilibria and defects take of links, one after the other.
 
-        Directions (l, m), gaps, ``springs`` and ``lengths`` (l,), ``squares`` and ``periods`` (m,).
+        Directions (l, m), gaps, ``springs`` and ``lengths`` (l,), ``squares`` and ``periods`` (m,). Behind l (m + i)
+        numbers begin those with i = ``GAPS``, ``SPRINGS``, ``LENGTHS`` and ``SQUARES``.
         """
         parts = self.directions.T, self.gaps, self.springs, self.lengths, self.squares, self.periods
         return np.concatenate(parts, axis=None)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from multiphi_exudyn.levels.base.modal_base import ModalBase
+from multiphi_exudyn.levels.base.modal_base import LENGTHS, ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.eigenproblems.orthonormal import add_direction, scalar_product
 
@@ -20,8 +20,8 @@ def independent(base: ModalBase, rigid: Sequence[int]) -> bool:
     m, k = base.modes.count, len(rigid)
     if k <= 1 or k > m:
         return k <= m and not any(base.unmoved[i] for i in rigid)
-    memory = np.empty((k + 1) * m)
-    return bool(span(base.link_numbers, 0, len(base.links) * (m + 2), np.array(rigid, int), 0, memory, 0, m, k))
+    lengths, memory = len(base.links) * (m + LENGTHS), np.empty((k + 1) * m)
+    return bool(span(base.link_numbers, 0, lengths, np.array(rigid, int), 0, memory, 0, m, k))
 
 
 @compiled

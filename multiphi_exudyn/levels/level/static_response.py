@@ -17,7 +17,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
-from multiphi_exudyn.levels.base.modal_base import ModalBase
+from multiphi_exudyn.levels.base.modal_base import GAPS, SPRINGS, SQUARES, ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING
 from multiphi_exudyn.mathematics.eigenproblems.orthonormal import absolute_product, scalar_product
@@ -120,8 +120,7 @@ def write_gaps_and_strain(links: Numbers, y: Numbers, gaps: Numbers, closed: Int
 
     links: ``ModalBase.link_numbers``, of ``count`` links.
     """
-    energy, constants = 0.0, count * m
-    springs, squares = constants + count, constants + 3 * count
+    energy, constants, springs, squares = 0.0, count * (m + GAPS), count * (m + SPRINGS), count * (m + SQUARES)
     for link in range(count):
         gap = links[constants + link] + scalar_product(links, link * m, y, 0, m)
         size = abs(links[constants + link]) + absolute_product(links, link * m, y, 0, m)
