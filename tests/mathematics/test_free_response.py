@@ -131,9 +131,9 @@ class TestModalResponse:
     def test_round_off_beside_the_diagonal_is_no_coupling(self):
         damping = np.diag([1.0, 2.0, 3.0])
         damping[0, 1] = damping[1, 0] = 1e-15
-        assert modal_response(OMEGA**2, damping).diagonal
+        assert modal_response(OMEGA**2, damping).alone.all()
         damping[0, 1] = damping[1, 0] = 1e-6
-        assert not modal_response(OMEGA**2, damping).diagonal
+        assert not modal_response(OMEGA**2, damping).alone.any()
 
     @pytest.mark.parametrize("seed", range(6))
     def test_defective_coupled_damping_is_accurate_or_a_failure_never_wrong(self, seed):

@@ -41,7 +41,7 @@ def test_is_taken_where_damping_is_light_in_few_steps(monkeypatch, ratio):
     monkeypatch.setattr(light_damping, "MOST_STEPS", 12)  # a compiled function has its own limit
     monkeypatch.setattr(free_response, "write_closed_form", free_response.closed_form)
     response = modal_response(squares, damping)
-    assert not response.diagonal
+    assert not response.alone.any()
     assert np.array_equal(response.shapes.diagonal(), np.ones(12))
     left = squares[:, None] * response.shapes + damping @ response.shapes * response.basis.rates
     left += response.shapes * response.basis.rates**2

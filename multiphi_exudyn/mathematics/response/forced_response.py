@@ -46,7 +46,7 @@ def particular(
     """
     if not np.any(forces):
         return np.zeros((1, len(squares)), complex)
-    if response.diagonal:
+    if response.alone.all():
         return _uncoupled(squares, np.diagonal(damping) / 2, rate, forces, horizon)
     is_alone, poles = response.alone, response.poles
     free = np.zeros((1, len(squares)), complex)

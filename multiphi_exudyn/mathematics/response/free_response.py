@@ -48,8 +48,7 @@ class ModalResponse:
     """The closed form of the module's equation.
 
     basis: the p exponentials. maps: A, B, P and V^T (4, p, r) complex. alone: (r,) modes with an equation of their own.
-    In the motion of the other modes poles (p,) marks the exponentials of single poles; chains have the rest. diagonal:
-    whether D was diagonal to round-off.
+    In the motion of the other modes poles (p,) marks the exponentials of single poles; chains have the rest.
     """
 
     basis: Exponentials
@@ -57,7 +56,6 @@ class ModalResponse:
     alone: np.ndarray
     poles: np.ndarray
     chains: tuple[Chain, ...] = ()
-    diagonal: bool = False
 
     @property
     def shapes(self) -> np.ndarray:
@@ -148,7 +146,7 @@ def lightly_coupled(squares: np.ndarray, damping: np.ndarray, duration: float = 
         oscillates = numbers[(2 + r) * r :][:r] == 1.0
         rates, powers, maps = _with_other_modes(squares, numbers[r : 2 * r], rates, maps, oscillates, duration)
     basis, poles = Exponentials(rates, powers), flags(len(rates), False)
-    return ModalResponse(basis, maps, flags(r, True), poles, diagonal=True)
+    return ModalResponse(basis, maps, flags(r, True), poles)
 
 
 @compiled
