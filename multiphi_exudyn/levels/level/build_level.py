@@ -71,9 +71,10 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
 def _lowest_modes(
     base: ModalBase, closed_directions: ClosedDirections, modes: int | None, constraints: int, rigid_body: int
 ) -> tuple[np.ndarray, np.ndarray, float, int]:
-    """Return ``level_modes``, with omega^2 = 0 of zero-frequency modes, and how many of them end with a cluster.
+    """Return ``level_modes``, with omega^2 = 0 of zero-frequency modes, and how many modes the level keeps.
 
-    All are kept where a method gives all.
+    It keeps all where a method gives all, else the lowest ``modes`` and those that complete their last cluster, for
+    which one mode more has to be known. constraints: number of rigid contacts. rigid_body: of rigid-body modes.
     """
     most, beyond = base.modes.count - constraints, 1
     while True:
