@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy.sparse.linalg
 from numpy.testing import assert_allclose
-from small_structures import bed
+from small_structures import bed, chain
 
 from multiphi_exudyn import LinearStructure, MultiPhiModel, UnilateralContact, simulate
 from multiphi_exudyn.levels.level.build_level import build_level
@@ -24,6 +24,13 @@ SYMMETRIC = 1e-12  # of the largest displacement
 
 
 SETS = [(), (3,), (3, 4), (3, 4, 20, 33), tuple(range(10, 30))]
+
+
+def owners_of(value):
+    """The array that owns the memory of an array; nothing for other values."""
+    while isinstance(value, np.ndarray) and isinstance(value.base, np.ndarray):
+        value = value.base
+    return [value] if isinstance(value, np.ndarray) else []
 
 
 class TestFewModesOfALevel:
@@ -84,6 +91,27 @@ class TestFewModesOfALevel:
         assert np.linalg.norm(few.vectors[:, :12] - wanted @ (wanted.T @ few.vectors[:, :12]), 2) < 1e-10
         stiff = few.vectors.T @ (base.squares[:, None] * few.vectors) + (few.gap_rows.T * base.springs) @ few.gap_rows
         assert_allclose(stiff, np.diag(few.squares), rtol=0, atol=1e-9 * few.squares[-1])
+
+    def test_end_with_a_cluster(self):
+        """Of a string held in its middle every mode of one half is a pair, of which none is parted."""
+        middle = np.eye(159)[79]
+        stiff = 4e4 * (2 * np.eye(159) - np.eye(159, k=1) - np.eye(159, k=-1))
+        structure = LinearStructure(np.eye(159), stiff)
+        base = MultiPhiModel(structure, [UnilateralContact("stop", middle, 1e-3, math.inf)], modes=12).base
+        for modes, kept in ((11, 12), (12, 12), (13, 14)):
+            few = build_level(base, (0,), modes)
+            assert few.modes == kept
+            assert few.truncated(kept) is few
+            assert few.truncated(2).vectors.base is few.vectors.base
+
+    @pytest.mark.parametrize("stiffness", [1e6, math.inf])
+    def test_keep_no_other_array_of_their_size(self, stiffness):
+        """The modes beyond, by which a cluster's end is told, and the memory of their roots are let go."""
+        stop = UnilateralContact("stop", np.eye(200)[130], 1e-3, stiffness)
+        level = MultiPhiModel(chain(200), [stop], modes=12).level(("stop",))
+        owners = {id(owner): owner.nbytes for value in vars(level).values() for owner in owners_of(value)}
+        assert level.vectors.nbytes == 12 * 200 * 8
+        assert sum(owners.values()) < 1.2 * level.vectors.nbytes
 
     @pytest.mark.parametrize("stiffness", [10.0, 1e6, math.inf])
     def test_are_iterated_in_a_large_base(self, monkeypatch, stiffness):

@@ -36,12 +36,12 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     orthogonal = closed_directions.orthogonal
     rigid_body = _rigid_body_modes(base, orthogonal)
     squares, vectors, accuracy, kept = _lowest_modes(base, orthogonal, modes, len(rigid), rigid_body)
-    neutral = vectors[:, :0]
+    neutral = None
     if not (is_vibrating := np.count_nonzero(squares) == len(squares)):
         squares, vectors = _aligned_free_modes(base, squares, vectors, closed)
         zero = squares == 0
-        neutral = vectors[:, zero] if np.count_nonzero(zero) > rigid_body else neutral
-    squares, vectors = squares[:kept], vectors[:, :kept]
+        neutral = vectors[:, zero] if np.count_nonzero(zero) > rigid_body else None
+    squares, vectors = squares[:kept].copy(), vectors[:, :kept]  # a view would keep all that was computed
     stiffnesses = closed_directions.stiffness.tolist()
     rows = level_rows(base, closed, stiffnesses, squares, vectors, accuracy, check=is_vibrating)
     if rows is None:
@@ -62,7 +62,7 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
         speed_rows=rows.gaps,
         force_rows=rows.forces,
         force_rate_rows=rows.force_rates,
-        neutral=neutral,
+        neutral=rows.vectors[:, :0] if neutral is None else neutral,
         computed=squares,
         kept_beyond=0,
     )

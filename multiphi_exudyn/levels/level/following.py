@@ -30,8 +30,8 @@ def write_span(
 ) -> int:
     """Write unit vectors (k, m) of the space of k rigid links; return 1 where these are independent, else 0.
 
-    links: directions of all links, each (m,), and their lengths, from two places on. rigid: numbers of the rigid ones,
-    from ``first`` on. scratch: the unit vectors, and memory (m,), from ``basis`` on.
+    links: holds the directions (m,) of all links from ``directions`` on, and their lengths from ``lengths`` on. rigid:
+    numbers of the rigid ones, from ``first`` on. scratch: from ``basis`` on the unit vectors, and memory (m,).
     """
     for p in range(k):
         link = rigid[first + p]
@@ -44,7 +44,11 @@ def write_span(
 def write_following(
     links: Numbers, directions: int, lengths: int, scratch: Numbers, basis: int, flags: int, m: int, count: int, k: int
 ) -> None:
-    """Set flags (count,) of the links that k rigid ones hold, whose space ``write_span`` has written."""
+    """Set flags (count,) of links that k rigid ones hold, and of those that no mode moves.
+
+    links: as in ``write_span``. scratch: from ``basis`` on what that has written, (k, m), and memory (m,); from
+    ``flags`` on the flags.
+    """
     for link in range(count):
         length, direction, square = links[lengths + link], directions + link * m, 0.0
         for p in range(k if length > 0.0 else 0):

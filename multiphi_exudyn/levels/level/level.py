@@ -215,7 +215,10 @@ class Level(Shown):
         return modal_response(self.squares, self.damping_matrix, self.coupling, duration)
 
     def truncated(self, count: int) -> Level:
-        """Return the same level with its lowest ``count`` modes, and those that complete a cluster of one frequency."""
+        """Return a level with the lowest ``count`` modes of this one, and those that complete a cluster.
+
+        It is this one if this one was truncated to as many.
+        """
         if count == self.modes - self.kept_beyond:
             return self
         modes = cluster_end(self.squares, count) or self.modes

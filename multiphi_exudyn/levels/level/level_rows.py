@@ -105,9 +105,10 @@ def write_rows(
 ) -> int:
     """Make the signs of modes (r, m) unique, and write all rows; return whether this is DONE, or why not.
 
-    base: ``ModalBase.level_numbers``. damped: C_l psi (r, m). numbers: gaps (l, r), D (r, r), forces (2, k, r), the
-    first two for modes of any sign. closed: numbers of the k closed links, of the c rigid ones, and places of these
-    among the closed ones. scratch: signs (r,), memory, and at the end flags of links that rigid ones hold.
+    base: ``ModalBase.level_numbers``. damped: C_l psi (r, m), overwritten. numbers: gaps (l, r), D (r, r), forces
+    (2, k, r), the first two for modes of any sign. closed: numbers of the k closed links, of the c rigid ones, and
+    places of these among the closed ones. scratch: signs (r,), memory, and at the end flags of links that rigid ones
+    hold.
     """
     observed, damping = links + points, r * links
     lengths, below = observed + m, observed + m + links

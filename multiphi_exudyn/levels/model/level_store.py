@@ -68,7 +68,7 @@ class LevelStore:
         return max(FEWEST_LEVELS, CACHE_BYTES // (8 * r * numbers_per_mode))
 
     def level(self, indices: tuple[int, ...], modes: int) -> Level:
-        """Return a level with at least its lowest ``modes`` modes, or with all."""
+        """Return a level with at least its lowest ``modes`` modes, or with all; its last mode ends a cluster."""
         base, levels = self.base, self._levels
         assert base is not None, "levels need a base"
         if levels is None:
