@@ -75,7 +75,8 @@ def judged(scene):
         motion = native(scene)
     except mp.MultiPhiError as refusal:
         return [("refused", str(refusal))], ["refused", 0, []]
-    return _verdicts(scene, motion), digest(motion)
+    found, motion = _verdicts(scene, motion)
+    return found, digest(motion)
 
 
 def native(scene):
@@ -118,17 +119,24 @@ def _impulse(scene, runs):
 
 
 def digest(motion):
-    """Status, number of events and some displacements: what has to be the same on every processor."""
+    """Status, number of events and some displacements: what has to be the same on every processor.
+
+    Round-off that is no motion is zero.
+    """
     every = max(1, INSTANTS // DIGEST)
     status = motion.status if motion.status == "ok" else motion.message.split(": ", 1)[-1].split(" ")[0]
-    return [status, motion.events, [float(f"{value:.10g}") for value in motion.displacement[:, ::every].ravel()]]
+    values = motion.displacement[:, ::every].ravel()
+    if np.max(np.abs(values), initial=0.0) <= NO_MOTION * motion.scale[0]:
+        values = np.zeros_like(values)
+    return [status, motion.events, [float(f"{value:.10g}") for value in values]]
 
 
 def _verdicts(scene, motion):
+    """Verdicts of a motion, and the motion with the scale of the scene where brute force says it."""
     if "chatter" in motion.message:
-        return [("chatter", motion.message)]
+        return [("chatter", motion.message)], motion
     if motion.status != "ok":
-        return [("named failure", motion.message)]
+        return [("named failure", motion.message)], motion
     found = [(f"failure: {text.split(':')[0]}", text) for run in motion.runs for text in laws_of(scene, run)]
     compared, scale = _compared(scene, motion)
     found += [("told" if kind == "failure: wrong" and told(motion) else kind, text) for kind, text in compared]
@@ -139,7 +147,7 @@ def _verdicts(scene, motion):
         found += in_two_parts(scene, motion)
     if not found and looked_at and scene.units == (0, 0, 0):
         found += in_the_body(scene, motion)
-    return found or [("ok", motion.message)]
+    return found or [("ok", motion.message)], motion
 
 
 def told(motion):

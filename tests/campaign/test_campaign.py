@@ -45,6 +45,14 @@ def test_a_scene_of_every_kind_is_right(kind):
     assert [verdict for verdict, _ in judged(kind, LIGHT[kind])[0]] == ["ok"]
 
 
+def test_round_off_of_a_scene_at_rest_is_no_answer_that_processors_could_differ_in():
+    """At its limit exactly, nothing moves: displacements are 1e-17."""
+    found, (status, events, values) = judged("friction limits", 5000014)
+    assert (found, status, events) == ([("ok", "")], "ok", 0)
+    assert len(values) > 20
+    assert not any(values)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_loop_as_plain_python_gives_the_same_answer(kind):
     model, end, x, v, loads = scaled(scene_of(kind, LIGHT[kind]))
