@@ -11,7 +11,7 @@ from multiphi_exudyn.events.packing import level_records
 from multiphi_exudyn.events.packing.level_arrays import LevelArrays
 from multiphi_exudyn.events.transitions import defect_forms, exits
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.levels.level import following, level_rows, static_response
+from multiphi_exudyn.levels.level import level_rows, static_response
 from multiphi_exudyn.levels.level.build_level import build_level
 from multiphi_exudyn.mathematics.eigenproblems import modes, orthonormal
 from multiphi_exudyn.mathematics.response import free_response
@@ -56,14 +56,14 @@ def test_a_rigid_contact_holds_the_gap_of_its_twin_and_of_what_others_span():
     base = model().base
     assert_array_equal(np.flatnonzero(build_level(base, (0,), 9).following), [0, 5])
     assert_array_equal(np.flatnonzero(build_level(base, (0, 2), 9).following), [0, 2, 5])
-    assert following.independent(base, [0, 2])
-    assert not following.independent(base, [0, 5])
-    assert not following.independent(base, [0, 2, 5])
+    assert base.independent([0, 2])
+    assert not base.independent([0, 5])
+    assert not base.independent([0, 2, 5])
 
 
 ENTRIES = [
     (level_rows, "fill_rows"),
-    (following, "span"),
+    (orthonormal, "span"),
     (static_response, "write_gaps"),
     (static_response, "single_response"),
     (modes, "set_signs"),

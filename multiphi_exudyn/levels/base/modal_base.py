@@ -23,6 +23,7 @@ from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.eigenproblems.modes import Modes
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import span
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.elements.element import Element
 from multiphi_exudyn.mechanics.elements.element_table import ElementTable
@@ -131,6 +132,14 @@ class ModalBase(ElementTable, Shown):
         """
         parts = self.directions.T, self.gaps, self.springs, self.lengths, self.squares, self.periods
         return np.concatenate(parts, axis=None)
+
+    def independent(self, rigid: Sequence[int]) -> bool:
+        """Return whether the directions of these rigid contacts are linearly independent: they can close together."""
+        m, k = self.modes.count, len(rigid)
+        if k <= 1 or k > m:
+            return k <= m and not any(self.unmoved[i] for i in rigid)
+        lengths, memory = len(self.links) * (m + LENGTHS), np.empty((k + 1) * m)
+        return bool(span(self.link_numbers, 0, lengths, np.array(rigid, int), 0, memory, 0, m, k))
 
     @functools.cached_property
     def direction_indices(self) -> list[int]:

@@ -12,7 +12,6 @@ import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.modal_base import ModalBase
-from multiphi_exudyn.levels.level.following import independent
 from multiphi_exudyn.levels.level.static_response import static_response
 
 __all__ = ["static_response_with_friction"]
@@ -41,7 +40,7 @@ def _frictionless_response(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the same without friction, for gaps (l,)."""
     rigid = [k for k in index if base.links[k].rigid]
-    if not independent(base, rigid):
+    if not base.independent(rigid):
         names = ", ".join(dict.fromkeys(repr(base.links[k].name) for k in rigid))
         raise NumericalFailure(
             f"static equilibrium: {names} hold the same motion, so how they share the load is not unique; need "

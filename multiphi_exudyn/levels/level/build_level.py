@@ -9,7 +9,6 @@ import numpy as np
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.base.modal_base import ModalBase
-from multiphi_exudyn.levels.level.following import independent
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.level.level_modes import level_modes
 from multiphi_exudyn.levels.level.level_rows import level_rows
@@ -30,7 +29,7 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     closed = list(indices)
     closed_directions = base.closed_at(indices)
     rigid = [i for i in closed if base.links[i].rigid]
-    if not independent(base, rigid):
+    if not base.independent(rigid):
         names = ", ".join(base.links[i].name for i in rigid)
         raise NumericalFailure(f"level: rigid contacts {names} are not independent of each other")
     orthogonal = closed_directions.orthogonal

@@ -6,10 +6,22 @@ import math
 
 import numpy as np
 
-from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
+from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 
-__all__ = ["absolute_product", "add_direction", "product_error", "remove_direction", "scalar_product", "without"]
+__all__ = [
+    "absolute_product",
+    "add_direction",
+    "product_error",
+    "remove_direction",
+    "scalar_product",
+    "span",
+    "without",
+    "write_following",
+    "write_span",
+]
+
+ALMOST = 0.99  # of a direction's square: with a smaller part in the span of others it is independent of them
 
 
 def without(directions: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -88,6 +100,41 @@ def add_direction(vectors: Numbers, vector: int, length: float, scratch: Numbers
 
 
 @compiled
+def write_span(
+    links: Numbers, directions: int, lengths: int, rigid: Ints, first: int, scratch: Numbers, basis: int, m: int, k: int
+) -> int:
+    """Write unit vectors (k, m) of the space of k rigid links; return 1 where these are independent, else 0.
+
+    links: holds the directions (m,) of all links from ``directions`` on, and their lengths from ``lengths`` on. rigid:
+    numbers of the rigid ones, from ``first`` on. scratch: from ``basis`` on the unit vectors, and memory (m,).
+    """
+    for p in range(k):
+        link = rigid[first + p]
+        if add_direction(links, directions + link * m, links[lengths + link], scratch, basis, m, p) == 0:
+            return 0
+    return 1
+
+
+@compiled
+def write_following(
+    links: Numbers, directions: int, lengths: int, scratch: Numbers, basis: int, flags: int, m: int, count: int, k: int
+) -> None:
+    """Set flags (count,) of links that k rigid ones hold, and of those that no mode moves.
+
+    links: as in ``write_span``. scratch: from ``basis`` on what that has written, (k, m), and memory (m,); from
+    ``flags`` on the flags.
+    """
+    for link in range(count):
+        length, direction, square = links[lengths + link], directions + link * m, 0.0
+        for p in range(k if length > 0.0 else 0):
+            share = scalar_product(scratch, basis + p * m, links, direction, m) / length
+            square += share * share
+        scratch[flags + link] = 1.0 if length == 0.0 else 0.0
+        if square > ALMOST and add_direction(links, direction, length, scratch, basis, m, k) == 0:
+            scratch[flags + link] = 1.0
+
+
+@compiled
 def largest_product_error(vectors: Numbers, m: int, r: int) -> float:
     """Return ``product_error`` of vectors (r, m); NaN where one is not finite."""
     largest = 0.0
@@ -99,4 +146,4 @@ def largest_product_error(vectors: Numbers, m: int, r: int) -> float:
     return largest
 
 
-remove_from, largest_error = entry(remove_direction), entry(largest_product_error)
+remove_from, largest_error, span = entry(remove_direction), entry(largest_product_error), entry(write_span)
