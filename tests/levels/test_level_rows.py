@@ -17,7 +17,7 @@ from multiphi_exudyn.mathematics.eigenproblems import modes, orthonormal
 from multiphi_exudyn.mathematics.response import free_response
 
 DAMPINGS = [mp.RayleighDamping(0.5, 1e-5), mp.ModalDamping(0.01)]
-SETS = [(0,), (1,), (0, 1), (0, 1, 3), (0, 2, 3, 4), (3, 4)]
+SETS = [(0,), (1,), (0, 1), (0, 1, 2), (0, 1, 3), (0, 2, 3, 4), (1, 2, 3), (3, 4)]
 
 
 def model(damping=DAMPINGS[0], modes=9):
