@@ -77,11 +77,19 @@ def timing(method, online_s, at=None, setting=None):
     )
 
 
+def in_turns(times, at=None):
+    """A row of settings timed in turns; times: (method, setting, times [s]) of each."""
+    cases = [row(method, at=at, setting=setting).parameters for method, setting, _ in times]
+    parameters = row("in turns", at=at).parameters | {"cases": cases}
+    values = {"repeats_s": [repeats for *_, repeats in times]}
+    return Row(parameters, "ok", "", values, 1.0, ENVIRONMENT, "2026-01-02T04:00:00Z")
+
+
 def result_of(rows, timings=(), methods=METHODS, **changes):
     """A result of given rows."""
     study = StudyFile.model_validate({"title": "A <small> study", "scene": "small", "methods": methods}, strict=False)
     given = {"study": study, "name": "small", "judged_points": POINTS, "window": 0.3, "rows": tuple(rows)}
-    given |= {"timings": tuple(timings), "budgets": (), "maps": (), "environment": ENVIRONMENT}
+    given |= {"timings": tuple(timings), "turns": (), "budgets": (), "maps": (), "environment": ENVIRONMENT}
     return StudyResult(**given | {"assumptions": ("The support is <stiff>.",), "quick": False} | changes)
 
 

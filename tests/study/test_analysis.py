@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pandas as pd
 import pytest
-from small_study import result_of, row, small_study, timing
+from small_study import in_turns, result_of, row, small_study, timing
 
 from multiphi_exudyn.study.accuracy.along_axis import numeric_axes, series, tables_along
 from multiphi_exudyn.study.accuracy.analysis import (
@@ -15,6 +15,7 @@ from multiphi_exudyn.study.accuracy.analysis import (
     front,
     full_methods,
     indicators,
+    near_cheapest,
     points,
     pointwise_until,
     rank_correlation,
@@ -115,6 +116,33 @@ def test_the_cheapest_setting_is_the_fastest_that_holds_the_tolerance():
     assert chosen(cheapest(both, {}, 0.02)) == {"a": 2, "b": None}
     assert chosen(cheapest(both, {}, 0.0199)) == {"a": 3, "b": None}
     assert chosen(cheapest(both, {}, 1e-6)) == {"a": None, "b": None}
+
+
+def test_near_the_cheapest_are_settings_whose_order_a_change_of_speed_could_turn():
+    both = timed(a=[(1.0, 0.5), (1e-3, 0.02), (3e-3, 0.02), (3.1e-3, 0.02)], b=[(0.1, 0.01), (0.2, 0.001), (0.4, 0.01)])
+    found = near_cheapest(both, {})
+    assert list(zip(found.method, modes_of(found), strict=True)) == [("a", 2), ("a", 3), ("b", 1), ("b", 2)]
+    assert near_cheapest(timed(a=[(2.0, 0.01), (2.1, 0.01)]), {}).empty  # too long to be repeated
+    assert near_cheapest(timed(a=[(None, 0.01), (1e-3, None)]), {}).empty
+
+
+def test_of_settings_timed_in_turns_too_these_times_count():
+    result = timed(a=[(1.0, 0.01)], b=[(1.1, 0.01), (5.0, 0.001)])
+    assert chosen(cheapest(result, {}, 0.01).head(1)) == {"a": 1}
+    turned = replace(result, turns=(in_turns([("a", {"modes": 1}, [3.0, 1.2, 1.0]), ("b", {"modes": 1}, [1.1] * 3)]),))
+    found = settings(turned)
+    assert list(found.online_s) == [1.2, 1.1, 5.0]
+    assert list(found.repeats_s) == [[3.0, 1.2, 1.0], [1.1] * 3, settings(result).repeats_s.iloc[2]]
+    assert list(found.in_turns) == [True, True, False]
+    assert chosen(cheapest(turned, {}, 0.01).head(1)) == {"b": 1}
+    read = list(csv.DictReader(io.StringIO(csv_text(turned))))
+    assert [(line["timing.online_s"], line["turns.online_s"]) for line in read] == [
+        ("1.0", "1.2"),
+        ("1.1", "1.1"),
+        ("5.0", ""),
+    ]
+    failed = replace(in_turns([("a", {"modes": 1}, [9.0])]), status="failed", values={})
+    assert settings(replace(result, turns=(failed,))).equals(settings(result))
 
 
 def test_how_many_times_faster_counts_from_the_fastest_full_model_of_the_same_tolerance():

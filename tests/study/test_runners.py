@@ -1,5 +1,7 @@
 """Runs of one scene's models: the start, the shared damping, and models that have to agree."""
 
+import statistics
+
 import numpy as np
 import pytest
 from small_scene import changed, write
@@ -16,7 +18,7 @@ from multiphi_exudyn.mechanics.structures.structure import damping_matrix
 from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.running import reduced_runner, runner, timing
 from multiphi_exudyn.study.running.runners import run_model
-from multiphi_exudyn.study.running.timing import repeated
+from multiphi_exudyn.study.running.timing import in_turns, repeated
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare, start_configuration
@@ -245,6 +247,26 @@ def test_short_runs_are_repeated_until_their_time_is_steady_and_long_ones_once(m
         assert abs(len(repeats) - expected) <= 1
         assert set(repeats) <= {duration}
     assert repeated(lambda: 0.001, 0.001, 0) == ()
+
+
+def test_in_turns_a_change_of_speed_changes_all_runs_alike():
+    """A machine at half its speed for stretches of seven runs."""
+    calls = []
+
+    def run(duration):
+        calls.append(duration)
+        return duration * (1 + len(calls) // 7 % 2)
+
+    times = in_turns([lambda: run(1.0), lambda: run(1.05), lambda: run(1.1)])
+    assert [len(each) for each in times] == 3 * [timing.ROUNDS]
+    assert calls[:6] == [1.0, 1.05, 1.1, 1.1, 1.05, 1.0]
+    medians = [statistics.median(each) for each in times]
+    assert medians == sorted(medians)
+
+
+def test_turns_end_with_their_round_where_they_take_long(monkeypatch):
+    monkeypatch.setattr(timing, "TURNS_BUDGET_S", 0.0)
+    assert in_turns([lambda: 1.0, lambda: 2.0]) == [(1.0,), (2.0,)]
 
 
 @pytest.mark.parametrize(("name", "counts"), [("compliant", False), ("full", True)])

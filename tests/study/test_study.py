@@ -213,6 +213,9 @@ class TestRunning:
             assert coarse > middle > fine > uncertainty(result, at) > 0
             assert (levels.online_s > 0).all()
             assert (levels.repeats_s.map(len) >= 3).all()
+            assert levels.in_turns.sum() >= 2
+            assert set(levels.repeats_s[levels.in_turns].map(len)) == {timing.ROUNDS}
+        assert [(row.status, row.message) for row in result.turns] == 2 * [("ok", "")]
         assert all(s.measures["indicator"] > 0 for s in found.itertuples() if s.method == "levels")
         stepwise = [row for row in result.rows if row.parameters["method"] == "stepwise"]
         assert all(row.parameters["nearby"] == {} for row in result.timings)
@@ -227,6 +230,7 @@ class TestRunning:
         again = run_study(study, store, progress=False)
         assert again.rows == first.rows
         assert again.timings == first.timings
+        assert again.turns == first.turns
 
     def test_in_processes_as_in_this_one(self, study_file, tmp_path, store):
         study = load_study(study_file(STUDY | {"methods": STUDY["methods"][:1], "timing": False, "axes": {}}))

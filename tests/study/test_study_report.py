@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
-from small_study import METHODS, coarser, contact, map_pairs, result_of, row, small_study, timing
+from small_study import METHODS, coarser, contact, in_turns, map_pairs, result_of, row, small_study, timing
 
 from multiphi_exudyn.study.accuracy import study_report
 from multiphi_exudyn.study.accuracy.analysis import cheapest, over_all_points, settings
@@ -111,6 +111,15 @@ def test_a_busy_machine_and_unsteady_repeats_are_told():
     assert "differ most" not in doubts[0]
     assert "Other programs ran during the timing pass: the load average rose to 3.2" in doubts[1]
     assert "The repeats of a differ most: 4 to 1." in doubts[1]
+
+
+def test_what_was_timed_in_turns_is_told():
+    rows, timings = [row("a", 0.1), row("b", 0.1)], [timing("a", 1.0), timing("b", 1.1)]
+    turns = (in_turns([("a", {}, [1.0] * 5), ("b", {}, [1.1] * 5)]),)
+    told = findings(result_of(rows, timings, turns=turns))["timing"][-1]
+    assert told.startswith("Of these, 2 settings that take at most 3 times as long as the cheapest within a tolerance")
+    assert "in 5 rounds" in told
+    assert "turns" not in " ".join(findings(result_of(rows, timings))["timing"])
 
 
 def test_what_lies_below_the_uncertainty_is_told_as_that():

@@ -15,6 +15,7 @@ from multiphi_exudyn.study.accuracy.study_file import COARSER, REFERENCE, is_num
 from multiphi_exudyn.study.accuracy.study_result import StudyResult, worst_judged
 from multiphi_exudyn.study.comparison.wording import seconds
 from multiphi_exudyn.study.running.runner import modes_text
+from multiphi_exudyn.study.running.timing import REPEAT_BUDGET_S
 from multiphi_exudyn.study.sweep.row import key_of
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "longest",
     "most_accurate",
     "named",
+    "near_cheapest",
     "over_all_points",
     "points",
     "pointwise_until",
@@ -39,6 +41,7 @@ __all__ = [
 
 ROUND_OFF = 1e-9  # NRMSE below which two answers differ by round-off only
 FEWEST = 3  # pairs that have a rank correlation
+NEAR = 3.0  # times the cheapest within a tolerance: a machine whose speed varies could change the order of such times
 
 
 def settings(result: StudyResult) -> pd.DataFrame:
@@ -84,6 +87,21 @@ def cheapest(result: StudyResult, at: Mapping[str, Any], tolerance: float, lasti
     others = pd.DataFrame({"method": [name for name in drawn.method.unique() if name not in set(best.method)]})
     full = best.online_s[best.method.isin(full_methods(result))].min()
     return pd.concat([best.assign(faster=full / best.online_s), others], ignore_index=True)
+
+
+def near_cheapest(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
+    """Settings whose time is at most ``NEAR`` times that of the cheapest within one of the study's tolerances.
+
+    Of runs too long to be repeated (timing.py) none.
+    """
+    table = settings_at(result, at)
+    timed = table[table.online_s < REPEAT_BUDGET_S]
+    near = pd.Series(False, timed.index)
+    for tolerance in result.study.tolerances:
+        for kind in ("error", "lasting_error"):
+            within = timed[timed[kind] <= tolerance].online_s
+            near |= timed.index.isin(within.index[within <= NEAR * within.min()])
+    return timed[near]
 
 
 def most_accurate(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:

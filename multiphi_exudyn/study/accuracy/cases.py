@@ -5,7 +5,8 @@
 
 content is a hash of the scene with the study's changes, the reference, the method's model, the files of matrices, the
 time limit, and the versions of this package and of Exudyn: a stored run is reused only if all of these are the same.
-The method "reference" is the scene's reference at that point of the axes, "coarser" its copy.
+The method "reference" is the scene's reference at that point of the axes, "coarser" its copy; "in turns" has
+"cases": those that are timed in turns.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import hashlib
 import itertools
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -37,6 +38,7 @@ __all__ = ["BUDGET", "CASE", "Parameters", "Study", "load_study", "shipped_studi
 
 CASE = "case"  # name of the model that a case runs
 BUDGET = "budget"  # method of the error budgets' cases
+TURNS = "in turns"  # method of settings that are timed together
 DEFAULT_MODES = SceneFile.model_fields["modes"].default
 MOST_RUNS = 1_000_000  # of a study: more is probably a typing error
 
@@ -89,6 +91,10 @@ class Study:
         """One case for each point of the axes, if the study has a budget."""
         budget = self.file.budget
         return [] if budget is None else [self._case(at, BUDGET, budget.model_dump(), {}) for at in self.points]
+
+    def turns(self, at: Mapping[str, Any], cases: Sequence[Parameters]) -> Parameters:
+        """The case that times these cases in turns, at one point of the axes."""
+        return {**self._case(at, TURNS, {}, {}), "cases": list(cases)}
 
     def scene_for(self, parameters: Mapping[str, Any]) -> Scene:
         """Scene of a case: the models named in its comparison, and the model of the case under the name CASE."""

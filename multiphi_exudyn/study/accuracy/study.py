@@ -1,11 +1,12 @@
-"""A study from beginning to end: references, error pass, error budgets, timing pass, maps.
+"""A study from beginning to end: references, error pass, error budgets, timing pass, turns, maps.
 
 The error pass runs wherever the executor has workers. At the first point of the scene's axes every setting itself, not
 its nearby ones, is run once more, nudged, for its sensitivity horizon: one number per model is enough, and the other
 points cost what they did. Warnings are kept with every run. Rigid levels are measured against stiff stops as well. The
 timing pass is another one: each setting again, one at a time, in this process, with nothing else of the study running,
-a first run and its repeats. Every run is kept in the store as it ends, so a study that was stopped goes on where it
-was; maps are made anew with every report.
+a first run and its repeats. Settings whose times are near the cheapest are then timed in turns, since a machine's
+speed may change between one setting and the next. Every run is kept in the store as it ends, so a study that was
+stopped goes on where it was; maps are made anew with every report.
 """
 
 from __future__ import annotations
@@ -19,26 +20,28 @@ from typing import Any
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.study.accuracy.analysis import most_accurate
+from multiphi_exudyn.study.accuracy.analysis import most_accurate, near_cheapest
 from multiphi_exudyn.study.accuracy.budget import budget
 from multiphi_exudyn.study.accuracy.cases import CASE, Parameters, Study
-from multiphi_exudyn.study.accuracy.study_result import MapPair, StudyResult
+from multiphi_exudyn.study.accuracy.study_result import MapPair, StudyResult, setting_key
 from multiphi_exudyn.study.measures.measures import measures
 from multiphi_exudyn.study.measures.spectra import FEWEST, FREQUENCIES, wavelet_map
 from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models, stiff_stops
 from multiphi_exudyn.study.running.environment import environment
-from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study.running.runners import ready_model, run_model
 from multiphi_exudyn.study.running.runs import ModelRun, from_arrays, to_arrays
+from multiphi_exudyn.study.running.timing import in_turns
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.workbench import Setup, prepare
 from multiphi_exudyn.study.sweep.row import Row
 from multiphi_exudyn.study.sweep.run import Function, Outcome
 from multiphi_exudyn.study.sweep.store import Store
 from multiphi_exudyn.study.sweep.sweep import sweep
+from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
-__all__ = ["BudgetRun", "MeasuredRun", "TimedRun", "run_study"]
+__all__ = ["BudgetRun", "MeasuredRun", "TimedRun", "TimedTurns", "run_study"]
 
-ERRORS, TIMING, BUDGETS = "error", "timing", "budget"  # names of the passes in the store
+ERRORS, TIMING, TURNS, BUDGETS = "error", "timing", "in turns", "budget"  # names of the passes in the store
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,19 @@ class TimedRun:
 
 
 @dataclass(frozen=True)
+class TimedTurns:
+    """A case of the turns: several settings, each prepared and run once, then timed in turns."""
+
+    study: Study
+
+    def __call__(self, parameters: Mapping[str, Any]) -> Outcome:
+        """Times [s] of every one of the cases, in their order."""
+        with kept_back():
+            runs = [ready_model(_bench(self.study, case), self.study.model_name(case)) for case in parameters["cases"]]
+            return Outcome({"repeats_s": [list(times) for times in in_turns(runs)]})
+
+
+@dataclass(frozen=True)
 class BudgetRun:
     """A case of the error budgets."""
 
@@ -120,7 +136,18 @@ def run_study(study: Study, store: Store, executor: Executor | None = None, prog
             rows += passed(measured, cases, ERRORS, executor=executor, keep_histories=kept)
     budgets = passed(BudgetRun(study), study.budgets(), BUDGETS, executor=executor)
     timings = passed(TimedRun(study), _timed(study, rows), TIMING) if study.file.timing else ()
-    return _result(study, tuple(rows), timings, budgets, store)
+    result = _result(study, tuple(rows), timings, budgets, store)
+    turns = sweep(TimedTurns(study), list(_turns(study, result)), store, TURNS, progress=progress)
+    return replace(result, turns=turns)
+
+
+def _turns(study: Study, result: StudyResult) -> Iterator[Parameters]:
+    """At every point of the axes the case of settings to be timed in turns, where there are several."""
+    for at in study.points:
+        near = set(near_cheapest(result, at).index)
+        cases = [dict(row.parameters) for row in result.timings if setting_key(row.parameters) in near]
+        if len(cases) > 1:
+            yield study.turns(at, cases)
 
 
 def _stored(store: Store, case: Parameters) -> ModelRun | None:
@@ -170,6 +197,7 @@ def _result(
         window=_window(study, setup),
         rows=rows,
         timings=timings,
+        turns=(),
         budgets=budgets,
         maps=(),
         environment=environment(),

@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from multiphi_exudyn.study.accuracy.analysis import (
+    NEAR,
     cheapest,
     full_methods,
     longest,
@@ -175,6 +176,8 @@ def _times(result: StudyResult) -> dict[str, Any]:
         "loads": _loads(result),
         "busy": BUSY,
         "hosts": len({row.environment.get("host") for row in result.timings}),
+        "rounds": timed.repeats_s[timed.in_turns].map(len).tolist(),
+        "near": NEAR,
         "counts": [len(row.values["repeats_s"]) for row in result.timings if row.status == "ok"],
     }
 

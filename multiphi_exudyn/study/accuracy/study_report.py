@@ -92,7 +92,7 @@ def render_study(result: StudyResult) -> str:
         correlations=_correlations(result),
         budget=_budget(result),
         maps=list(_maps(result)),
-        failed=[row for row in (*result.rows, *result.timings, *result.budgets) if row.status != "ok"],
+        failed=[row for row in (*result.rows, *result.timings, *result.turns, *result.budgets) if row.status != "ok"],
         most_failures=MOST_FAILURES,
         metrics=metrics.METRICS,
     )

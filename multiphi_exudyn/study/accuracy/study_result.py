@@ -10,7 +10,8 @@ from __future__ import annotations
 import functools
 import json
 import math
-from collections.abc import Mapping, Sequence
+import statistics
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +22,7 @@ from multiphi_exudyn.study.accuracy.study_file import REFERENCE, StudyFile
 from multiphi_exudyn.study.measures.spectra import Map
 from multiphi_exudyn.study.sweep.row import Row, key_of
 
-__all__ = ["MapPair", "StudyResult", "all_numbers", "csv_text", "error_of", "worst_judged"]
+__all__ = ["MapPair", "StudyResult", "all_numbers", "csv_text", "error_of", "setting_key", "worst_judged"]
 
 COUNTS = ("modes", "elements")  # fields of which more are finer; of others less are
 TIMES = ["online_s", "first_s", "offline_s", "repeats_s"]
@@ -48,7 +49,7 @@ class MapPair:
 
 @dataclass(frozen=True)
 class StudyResult:
-    """A study with all its rows: of the error pass, of the timing pass, of the budgets."""
+    """A study with all its rows: of the error pass, of the timing pass, of settings in turns, of the budgets."""
 
     study: StudyFile
     name: str
@@ -56,6 +57,7 @@ class StudyResult:
     window: float
     rows: tuple[Row, ...]
     timings: tuple[Row, ...]
+    turns: tuple[Row, ...]
     budgets: tuple[Row, ...]
     maps: tuple[MapPair, ...]
     environment: Mapping[str, Any]
@@ -71,7 +73,7 @@ class StudyResult:
         """
         lines = [
             {
-                "key": _setting_key(row),
+                "key": setting_key(row.parameters),
                 "point": key_of(row.parameters["at"]),
                 **row.parameters,
                 "error": error_of(self, row),
@@ -90,20 +92,28 @@ class StudyResult:
         error: the worst of the nearby runs; NaN where one of them has none, and message names the cause.
         own_error: of the setting itself. lasting_error: the worst of it and of every finer setting that was tried,
         finer in its method's field ``refine`` alone; of methods without such a field its error. measures: of its own
-        run. online_s, the median of repeats_s, first_s and offline_s are of the timing pass.
+        run. online_s, the median of repeats_s, first_s and offline_s are of the timing pass;
+        of settings that were timed in turns too, online_s and repeats_s are of these. in_turns: whether they are.
         """
         own = self.runs[self.runs.nearby.map(len) == 0].set_index("key")
         of_setting = self.runs.assign(error=self.runs.error.fillna(math.inf)).groupby("key")
         cause = of_setting.cause.agg(lambda causes: next(filter(None, causes), ""))
-        times = {_setting_key(row): dict(row.values) for row in self.timings if row.status == "ok"}
-        untimed = {
-            _setting_key(row): f"timing {row.status}: {row.message}" for row in self.timings if row.status != "ok"
-        }
+        timings = [(setting_key(row.parameters), row) for row in self.timings]
+        times = {key: dict(row.values) for key, row in timings if row.status == "ok"}
+        untimed = {key: f"timing {row.status}: {row.message}" for key, row in timings if row.status != "ok"}
         table = own.rename(columns={"error": "own_error"}).assign(error=of_setting.error.max(), cause=cause)
         table = table.join(pd.DataFrame.from_dict(times, orient="index").reindex(columns=TIMES))
+        table["in_turns"] = table.index.isin(list(self._turns))
+        for key, found in self._turns.items():
+            table.at[key, "online_s"], table.at[key, "repeats_s"] = found["online_s"], found["repeats_s"]
         table["message"] = table.cause.where(table.cause != "", [untimed.get(str(key), "") for key in table.index])
         table["lasting_error"] = self._lasting(table)
         return table.replace({"error": math.inf, "lasting_error": math.inf}, np.nan)
+
+    @functools.cached_property
+    def _turns(self) -> dict[str, dict[str, Any]]:
+        """Setting, by its key -> median and times [s] in turns."""
+        return {setting_key(case): found for row in self.turns for case, found in _of_cases(row)}
 
     def _lasting(self, table: pd.DataFrame) -> pd.Series:
         """The worst error so far from the finest setting to the coarsest, of those alike but for one field."""
@@ -136,6 +146,8 @@ def all_numbers(result: StudyResult) -> pd.DataFrame:
     for name, rows in (("timing", result.timings), ("budget", result.budgets)):
         for row in rows:
             lines.setdefault(key_of(row.parameters), dict(row.parameters))[name] = _of_run(row)
+    for case, found in (pair for row in result.turns for pair in _of_cases(row)):
+        lines[key_of(case)]["turns"] = found
     return pd.json_normalize(list(lines.values()))
 
 
@@ -153,8 +165,15 @@ def _of_run(row: Row) -> dict[str, Any]:
     return {**of_run, **row.values}
 
 
-def _setting_key(row: Row) -> str:
-    return key_of({field: row.parameters[field] for field in ("method", "at", "setting")})
+def setting_key(parameters: Mapping[str, Any]) -> str:
+    """Key of the setting in these parameters of a run: the same for its nearby runs."""
+    return key_of({field: parameters[field] for field in ("method", "at", "setting")})
+
+
+def _of_cases(row: Row) -> Iterator[tuple[Mapping[str, Any], dict[str, Any]]]:
+    """Each case of a row of settings in turns, with its times [s] and their median; none of a row that failed."""
+    for case, repeats in zip(row.parameters["cases"], row.values.get("repeats_s", ()), strict=False):
+        yield case, {"online_s": statistics.median(repeats), "repeats_s": repeats}
 
 
 def _cause(result: StudyResult, row: Row) -> str:

@@ -7,6 +7,7 @@ the end of the run. The event loop is compiled before the timing starts, since a
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -64,9 +65,7 @@ class Runner(ABC):
 
     def run(self) -> ModelRun:
         """Prepare, solve and sample."""
-        if self.compiled and available():
-            compile_entries()
-        prepared, preparation_s = timed(self.prepare)
+        prepared, preparation_s = self._prepared()
         answer, first = self.solve(prepared)
         as_long = 0.0 if self.compiled else first  # a first run that builds levels takes longer than a repeat
         repeats = repeated(lambda: self.solve(prepared)[1], as_long, self.repeats(answer))
@@ -86,6 +85,18 @@ class Runner(ABC):
         complete = replace(run, **fields | histories)
         cause = _energy_gain(complete) if self.may_gain_energy else ""
         return replace(run, status="failed", message=cause) if cause else complete
+
+    def ready(self) -> Callable[[], float]:
+        """Prepare and solve once; every call solves again, and returns the time of the solver [s]."""
+        prepared, _ = self._prepared()
+        self.solve(prepared)
+        return lambda: self.solve(prepared)[1]
+
+    def _prepared(self) -> tuple[Any, float]:
+        """What ``prepare`` gives, and its time [s], which is not that of compiling."""
+        if self.compiled and available():
+            compile_entries()
+        return timed(self.prepare)
 
     def level_text(self) -> str:
         """Kind of levels, as part of a label."""

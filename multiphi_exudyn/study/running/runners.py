@@ -5,7 +5,7 @@ Every kind of model (multiphi_exudyn.study.scene.model_kinds) has a runner.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from multiphi_exudyn.errors import MultiPhiError
 from multiphi_exudyn.study.running.body_runner import BodyRunner
@@ -18,7 +18,7 @@ from multiphi_exudyn.study.running.stepwise_runner import SplittingRunner, Stepw
 from multiphi_exudyn.study.scene.workbench import Setup
 from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
-__all__ = ["run_model"]
+__all__ = ["ready_model", "run_model"]
 
 RUNNERS: Mapping[str, type[Runner]] = {
     "reduced": ReducedRunner,
@@ -47,3 +47,12 @@ def run_model(setup: Setup, name: str, progress: bool = True, retry: bool = Fals
         except (MultiPhiError, ArithmeticError, RuntimeError, ValueError) as error:
             cause = " ".join(str(error).split())
             return ModelRun(name, spec.kind, label, status="failed", message=cause)
+
+
+def ready_model(setup: Setup, name: str) -> Callable[[], float]:
+    """Prepare the scene's model ``name`` and run it once; every call runs it again and returns the solver's time [s].
+
+    Raises where the model fails.
+    """
+    spec = setup.scene.models[name]
+    return RUNNERS[spec.kind](setup, spec).ready()

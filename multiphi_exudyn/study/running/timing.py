@@ -1,17 +1,19 @@
-"""Wall-clock times of a run and of its repeats."""
+"""Wall-clock times of a run, of its repeats, and of several runs in turns."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-__all__ = ["repeated", "timed"]
+__all__ = ["in_turns", "repeated", "timed"]
 
 T = TypeVar("T")
 
 REPEAT_BUDGET_S = 2.0  # s; a run that takes longer is timed once
 STEADY_S = 0.3  # s, over which short runs are repeated: a machine's speed varies
+ROUNDS = 25  # of runs in turns
+TURNS_BUDGET_S = 20.0  # s, after which no further round begins
 
 
 def timed(run: Callable[[], T]) -> tuple[T, float]:
@@ -33,3 +35,19 @@ def repeated(run: Callable[[], float], first: float, fewest: int) -> tuple[float
         repeats.append(run())
         spent += repeats[-1]
     return tuple(repeats)
+
+
+def in_turns(runs: Sequence[Callable[[], float]]) -> list[tuple[float, ...]]:
+    """Times [s] of several runs, each of which returns its time, as they take turns, forwards and backwards.
+
+    A change of the machine's speed then changes all of them alike.
+    """
+    times: list[list[float]] = [[] for _ in runs]
+    order, started = list(zip(runs, times, strict=True)), time.perf_counter()
+    for number in range(ROUNDS):
+        if number and time.perf_counter() - started > TURNS_BUDGET_S:
+            break
+        for run, found in order:
+            found.append(run())
+        order.reverse()
+    return [tuple(found) for found in times]
