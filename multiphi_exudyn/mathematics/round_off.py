@@ -46,22 +46,18 @@ def clear_products(numbers: Numbers, products: int, given: int, matrix: Numbers,
     """Set products A x (count,) to zero where they are round-off of their terms, |A| |x|.
 
     matrix: |A|, row by row. The terms are at most ``row_sums`` of |A| times the largest |x|; they are added up only
-    where this bound does not decide.
+    where this bound does not decide, and only until they decide.
     """
     largest = 0.0
     for j in range(count):
         largest = max(largest, abs(numbers[given + j]))
     for i in range(count if largest > 0.0 else 0):
         if abs(numbers[products + i]) <= CLEAR * (numbers[row_sums + i] * largest):
-            row, first, second, third, fourth = i * count, 0.0, 0.0, 0.0, 0.0
-            for j in range(0, count - 3, 4):  # four independent sums
-                first += matrix[row + j] * abs(numbers[given + j])
-                second += matrix[row + j + 1] * abs(numbers[given + j + 1])
-                third += matrix[row + j + 2] * abs(numbers[given + j + 2])
-                fourth += matrix[row + j + 3] * abs(numbers[given + j + 3])
-            for j in range(count - count % 4, count):
-                first += matrix[row + j] * abs(numbers[given + j])
-            if abs(numbers[products + i]) <= ZERO * (first + second + third + fourth):
+            terms, j = 0.0, 0
+            while j < count and abs(numbers[products + i]) > ZERO * terms:
+                terms += matrix[i * count + j] * abs(numbers[given + j])
+                j += 1
+            if abs(numbers[products + i]) <= ZERO * terms:
                 numbers[products + i] = 0.0
 
 

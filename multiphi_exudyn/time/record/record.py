@@ -57,6 +57,7 @@ class Record:
     def __init__(self, contacts: Sequence[Element], arrays: LevelArrays) -> None:
         self._contacts, self.arrays = contacts, arrays
         self.count = self.left_out_count = 0  # of segments
+        self.event_count = 0
         self.levels: list[LoadedLevel] = []
         self._numbers: dict[tuple[int, ...], int] = {}  # of the levels, by the states of their elements
         self._parts: dict[str, GrowingArray] = {}
@@ -86,6 +87,7 @@ class Record:
             self.count += len(part["rows"])
             self.left_out_count += len(part.get("left_out", ()))
         if "kinds" in part:
+            self.event_count += int(np.count_nonzero(part["kinds"][:, 1] != a.SHARED))
             vars(self).pop("event_rows", None)
 
     @property
@@ -109,11 +111,6 @@ class Record:
     def visited(self) -> tuple[tuple[int, ...], ...]:
         """States of the elements of every visited level."""
         return tuple(self._numbers)
-
-    @property
-    def eventless(self) -> bool:
-        """Whether there is certainly no event; False where only the arrays, once joined, would show it."""
-        return not self._parts and "kinds" not in self._last
 
     def _add(self, part: dict[str, np.ndarray]) -> None:
         parts, rows = self._parts, part.get("rows", EMPTY["rows"])

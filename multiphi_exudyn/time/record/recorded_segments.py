@@ -146,7 +146,7 @@ class Events(LazySequence[Event]):
     """The events of a record so far; lost (6,): energies [J] lost at all of them."""
 
     def __init__(self, record: Record, lost: np.ndarray) -> None:
-        self._count, self._made = 0 if record.eventless else len(record.event_rows), {}
+        self._count, self._made = record.event_count, {}
         self._record, self._lost = record, lost
 
     @property
