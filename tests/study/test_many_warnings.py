@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+import threading
 import warnings
 from dataclasses import replace
 
@@ -32,7 +33,7 @@ from multiphi_exudyn.study.scene.workbench import prepare
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
 from multiphi_exudyn.study.stability.report import text_table
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
-from multiphi_exudyn.time.warnings.warning_groups import grouped
+from multiphi_exudyn.time.warnings.warning_groups import grouped, issue, kept_back
 from reference_models.solver_settings import fixed_steps
 
 LINEAR = "linear range: moments differ by 30 % at the largest rotation; take a nonlinear model"
@@ -67,6 +68,18 @@ def bench_of(scene_file):
 def text_of(page):
     """What is read: without tags and pictures."""
     return " ".join(re.sub(r"<style>.*?</style>|<[^>]+>", " ", page, flags=re.DOTALL).split())
+
+
+def test_what_one_thread_keeps_back_another_issues():
+    with warnings.catch_warnings(record=True) as issued:
+        warnings.simplefilter("always")
+        with kept_back():
+            issue([SHARE])
+            other = threading.Thread(target=issue, args=([LINEAR],))
+            other.start()
+            other.join()
+        issue([SHARE])
+    assert [str(each.message) for each in issued] == [LINEAR, SHARE]
 
 
 def test_warnings_are_grouped_by_what_stands_before_the_first_colon():

@@ -8,15 +8,18 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 
 from multiphi_exudyn.errors import MultiPhiWarning
 
-__all__ = ["WarningGroup", "grouped", "issue", "kept_back"]
+__all__ = ["CALLER", "WarningGroup", "grouped", "issue", "kept_back"]
 
 NAMED = 3  # runs of a group that its sentence names, one if their names are long
 LONG = 60  # characters of these names
 CALLER = 3  # level of the stack: the line that calls the caller of ``issue``
+
+_is_keeping_back = ContextVar("is_keeping_back", default=False)  # of a thread: filters of warnings are of all threads
 
 
 @dataclass(frozen=True)
@@ -46,15 +49,17 @@ def grouped(runs: Iterable[tuple[str, Sequence[str]]]) -> tuple[WarningGroup, ..
     return tuple(WarningGroup(kind, tuple(names), example) for kind, (example, names) in groups.items())
 
 
-def issue(sentences: Iterable[str]) -> None:
-    """Issue each sentence as a MultiPhiWarning, at the line that calls the caller of this function."""
-    for sentence in sentences:
-        warnings.warn(sentence, MultiPhiWarning, CALLER)  # by a keyword it takes a seventh longer
+def issue(sentences: Iterable[str], level: int = CALLER) -> None:
+    """Issue each sentence as a MultiPhiWarning, at a level of the stack; nothing inside ``kept_back``."""
+    for sentence in () if _is_keeping_back.get() else sentences:
+        warnings.warn(sentence, MultiPhiWarning, level)  # by a keyword it takes a seventh longer
 
 
 @contextmanager
 def kept_back() -> Iterator[None]:
-    """Suppress MultiPhiWarning inside: for many runs the sentences are collected and issued in groups."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MultiPhiWarning)
+    """Issue nothing inside, in this thread: for many runs the sentences are collected and issued in groups."""
+    token = _is_keeping_back.set(True)
+    try:
         yield
+    finally:
+        _is_keeping_back.reset(token)

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import itertools
 import math
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 import exudyn as exu
 
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, MultiPhiWarning
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.time.warnings.warning_groups import CALLER, issue
 
 __all__ = ["BODIES", "Switching", "SwitchingBody", "bodies_of", "check_solver", "is_isolated", "running_solver"]
 
@@ -147,8 +147,7 @@ class Switching(dict[str, SwitchingBody]):
     def _warn(self) -> None:
         """Issue the warnings of the bodies about the run."""
         for body in self.values():
-            for sentence in body.warnings:
-                warnings.warn(f"{sentence} (body {body.name!r})", MultiPhiWarning, stacklevel=3)
+            issue((f"{sentence} (body {body.name!r})" for sentence in body.warnings), CALLER + 1)
 
     def install(self, mbs: Any) -> None:
         """Install the PostStep function of the system, which then calls the present one."""
