@@ -11,10 +11,8 @@ import math
 
 import numpy as np
 
-from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled
-
 __all__ = ["BALANCED", "CLEAR", "DEFECTIVE", "INDEPENDENT", "PRODUCT", "SLOW", "WORST_CONDITION", "ZERO", "all_finite"]
-__all__ += ["clear_products", "drop_round_off", "sign_of"]
+__all__ += ["drop_round_off", "sign_of"]
 
 ZERO = 1e-13  # of the sum of |terms|: a sum below it is round-off
 DEFECTIVE = 1e5  # condition of eigenvectors, from which close ones form a cluster; at a double root 1e8
@@ -39,26 +37,6 @@ def drop_round_off(sums: np.ndarray, sizes: np.ndarray | np.floating) -> np.ndar
     result = sums.copy()
     np.putmask(result, np.abs(sums) <= ZERO * sizes, 0.0)
     return result
-
-
-@compiled
-def clear_products(numbers: Numbers, products: int, given: int, matrix: Numbers, row_sums: int, count: int) -> None:
-    """Set products A x (count,) to zero where they are round-off of their terms, |A| |x|.
-
-    matrix: |A|, row by row. The terms are at most ``row_sums`` of |A| times the largest |x|; they are added up only
-    where this bound does not decide, and only until they decide.
-    """
-    largest = 0.0
-    for j in range(count):
-        largest = max(largest, abs(numbers[given + j]))
-    for i in range(count if largest > 0.0 else 0):
-        if abs(numbers[products + i]) <= CLEAR * (numbers[row_sums + i] * largest):
-            terms, j = 0.0, 0
-            while j < count and abs(numbers[products + i]) > ZERO * terms:
-                terms += matrix[i * count + j] * abs(numbers[given + j])
-                j += 1
-            if abs(numbers[products + i]) <= ZERO * terms:
-                numbers[products + i] = 0.0
 
 
 def sign_of(terms: np.ndarray, constant: float, size: float = 0.0) -> int:

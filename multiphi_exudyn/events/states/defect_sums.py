@@ -44,6 +44,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.events.states.maps import find_map, map_state
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
+from multiphi_exudyn.mathematics.eigenproblems.orthonormal import scalar_product
 
 __all__ = ["add_defect", "add_start_defect", "lacks_struck_defects"]
 
@@ -108,16 +109,13 @@ def squares(numbers: Numbers, factors: int, width: int, x: int, v: int, count: i
 
     x, v: (count,).
     """
-    displaced, moving, constant = factors + 1, factors + width * width, numbers[factors]
-    for j in range(count):
-        constant += numbers[displaced + j] * numbers[x + j]
+    displaced, moving = factors + 1, factors + width * width
+    constant = numbers[factors] + scalar_product(numbers, displaced, numbers, x, count)
     result = constant * constant
     for i in range(count):
         displaced += width
-        d, w = 0.0, 0.0
-        for j in range(i, count):
-            d += numbers[displaced + j] * numbers[x + j]
-            w += numbers[moving + j] * numbers[v + j]
+        d = scalar_product(numbers, displaced + i, numbers, x + i, count - i)
+        w = scalar_product(numbers, moving + i, numbers, v + i, count - i)
         result += d * d + w * w
         moving += width - 1
     return result

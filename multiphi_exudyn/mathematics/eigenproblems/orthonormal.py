@@ -7,11 +7,12 @@ import math
 import numpy as np
 
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
-from multiphi_exudyn.mathematics.round_off import INDEPENDENT
+from multiphi_exudyn.mathematics.round_off import CLEAR, INDEPENDENT, ZERO
 
 __all__ = [
     "absolute_product",
     "add_direction",
+    "clear_products",
     "product_error",
     "remove_direction",
     "scalar_product",
@@ -65,6 +66,23 @@ def absolute_product(a: Numbers, first: int, b: Numbers, second: int, m: int) ->
     for i in range(m - m % 4, m):
         sum_0 += abs(a[first + i] * b[second + i])
     return (sum_0 + sum_1) + (sum_2 + sum_3)
+
+
+@compiled
+def clear_products(numbers: Numbers, products: int, given: int, matrix: Numbers, row_sums: int, count: int) -> None:
+    """Set products A x (count,) to zero where they are round-off of their terms, |A| |x|.
+
+    matrix: |A|, row by row. The terms are at most ``row_sums`` of |A| times the largest |x|; they are added up only
+    where this bound does not decide.
+    """
+    largest = 0.0
+    for j in range(count):
+        largest = max(largest, abs(numbers[given + j]))
+    for i in range(count if largest > 0.0 else 0):
+        size = abs(numbers[products + i])
+        if size <= CLEAR * (numbers[row_sums + i] * largest):
+            is_round_off = size <= ZERO * absolute_product(matrix, i * count, numbers, given, count)
+            numbers[products + i] = 0.0 if is_round_off else numbers[products + i]
 
 
 @compiled
