@@ -119,7 +119,7 @@ def test_the_cheapest_setting_is_the_fastest_that_holds_the_tolerance():
 
 
 def test_near_the_cheapest_are_settings_whose_order_a_change_of_speed_could_turn():
-    both = timed(a=[(1.0, 0.5), (1e-3, 0.02), (3e-3, 0.02), (3.1e-3, 0.02)], b=[(0.1, 0.01), (0.2, 0.001), (0.4, 0.01)])
+    both = timed(a=[(1.0, 0.5), (1e-3, 0.02), (1e-2, 0.02), (1.1e-2, 0.02)], b=[(0.1, 0.01), (0.9, 0.001), (1.1, 0.01)])
     found = near_cheapest(both, {})
     assert list(zip(found.method, modes_of(found), strict=True)) == [("a", 2), ("a", 3), ("b", 1), ("b", 2)]
     assert near_cheapest(timed(a=[(2.0, 0.01), (2.1, 0.01)]), {}).empty  # too long to be repeated
@@ -129,10 +129,11 @@ def test_near_the_cheapest_are_settings_whose_order_a_change_of_speed_could_turn
 def test_of_settings_timed_in_turns_too_these_times_count():
     result = timed(a=[(1.0, 0.01)], b=[(1.1, 0.01), (5.0, 0.001)])
     assert chosen(cheapest(result, {}, 0.01).head(1)) == {"a": 1}
-    turned = replace(result, turns=(in_turns([("a", {"modes": 1}, [3.0, 1.2, 1.0]), ("b", {"modes": 1}, [1.1] * 3)]),))
+    turns = in_turns([("a", {"modes": 1}, [2.0, 1.2, 1.2, 2.0, 1.0]), ("b", {"modes": 1}, [1.1] * 3)])
+    turned = replace(result, turns=(turns,))
     found = settings(turned)
     assert list(found.online_s) == [1.2, 1.1, 5.0]
-    assert list(found.repeats_s) == [[3.0, 1.2, 1.0], [1.1] * 3, settings(result).repeats_s.iloc[2]]
+    assert list(found.repeats_s) == [[2.0, 1.2, 1.2, 2.0, 1.0], [1.1] * 3, settings(result).repeats_s.iloc[2]]
     assert list(found.in_turns) == [True, True, False]
     assert chosen(cheapest(turned, {}, 0.01).head(1)) == {"b": 1}
     read = list(csv.DictReader(io.StringIO(csv_text(turned))))

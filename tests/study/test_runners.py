@@ -1,7 +1,5 @@
 """Runs of one scene's models: the start, the shared damping, and models that have to agree."""
 
-import statistics
-
 import numpy as np
 import pytest
 from small_scene import changed, write
@@ -18,7 +16,7 @@ from multiphi_exudyn.mechanics.structures.structure import damping_matrix
 from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.running import reduced_runner, runner, timing
 from multiphi_exudyn.study.running.runners import run_model
-from multiphi_exudyn.study.running.timing import in_turns, repeated
+from multiphi_exudyn.study.running.timing import in_turns, repeated, undisturbed
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare, start_configuration
@@ -260,8 +258,7 @@ def test_in_turns_a_change_of_speed_changes_all_runs_alike():
     times = in_turns([lambda: run(1.0), lambda: run(1.05), lambda: run(1.1)])
     assert [len(each) for each in times] == 3 * [timing.ROUNDS]
     assert calls[:6] == [1.0, 1.05, 1.1, 1.1, 1.05, 1.0]
-    medians = [statistics.median(each) for each in times]
-    assert medians == sorted(medians)
+    assert [undisturbed(each) for each in times] == [1.0, 1.05, 1.1]
 
 
 def test_turns_end_with_their_round_where_they_take_long(monkeypatch):

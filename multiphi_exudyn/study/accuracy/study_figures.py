@@ -87,7 +87,7 @@ def pareto_figure(result: StudyResult, at: Mapping[str, Any]) -> Figure:
     """Error against online time: every setting faint, each method's front strong, failures on the upper edge."""
     figure, (axes,) = panels([6.2])
     drawn = settings_at(result, at)
-    axes.set(xscale="log", yscale="log", xlabel="online time of one run, median", ylabel=_error_label(result))
+    axes.set(xscale="log", yscale="log", xlabel="online time of one run", ylabel=_error_label(result))
     for name, style in styles(result).items():
         own = drawn[(drawn.method == name) & drawn.online_s.notna()]
         if len(own):
@@ -225,7 +225,7 @@ def error_against_time(result: StudyResult, at: Mapping[str, Any], number: int) 
             faint = {"mark": 5, "faint": True, "notes": notes}
             lines.append(zoom_line(name, style.colour, 100 * own.error, 1e3 * own.online_s, **faint))
             lines.append(zoom_line(name, style.colour, 100 * best.error, 1e3 * best.online_s, mark=8, width=2))
-    x = {"label": "online time of one run, median [ms]", "group": f"time at {number}", "log": True}
+    x = {"label": "online time of one run [ms]", "group": f"time at {number}", "log": True}
     label = f"NRMSE to {result.window:g} s [%], worst of {', '.join(result.judged_points)}"
     own_uncertainty = uncertainty(result, at)
     return zoom_plot(label, x, lines, log=True, below=None if own_uncertainty is None else 100 * own_uncertainty)

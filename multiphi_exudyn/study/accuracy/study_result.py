@@ -10,7 +10,6 @@ from __future__ import annotations
 import functools
 import json
 import math
-import statistics
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +19,7 @@ import pandas as pd
 
 from multiphi_exudyn.study.accuracy.study_file import REFERENCE, StudyFile
 from multiphi_exudyn.study.measures.spectra import Map
+from multiphi_exudyn.study.running.timing import undisturbed
 from multiphi_exudyn.study.sweep.row import Row, key_of
 
 __all__ = ["MapPair", "StudyResult", "all_numbers", "csv_text", "error_of", "setting_key", "worst_judged"]
@@ -92,8 +92,8 @@ class StudyResult:
         error: the worst of the nearby runs; NaN where one of them has none, and message names the cause.
         own_error: of the setting itself. lasting_error: the worst of it and of every finer setting that was tried,
         finer in its method's field ``refine`` alone; of methods without such a field its error. measures: of its own
-        run. online_s, the median of repeats_s, first_s and offline_s are of the timing pass;
-        of settings that were timed in turns too, online_s and repeats_s are of these. in_turns: whether they are.
+        run. online_s, the median of repeats_s, first_s and offline_s are of the timing pass.
+        Of settings that were timed in turns, in_turns, repeats_s is of these, and online_s its lower quartile.
         """
         own = self.runs[self.runs.nearby.map(len) == 0].set_index("key")
         of_setting = self.runs.assign(error=self.runs.error.fillna(math.inf)).groupby("key")
@@ -112,7 +112,7 @@ class StudyResult:
 
     @functools.cached_property
     def _turns(self) -> dict[str, dict[str, Any]]:
-        """Setting, by its key -> median and times [s] in turns."""
+        """Setting, by its key -> its times [s] in turns, and the one that counts."""
         return {setting_key(case): found for row in self.turns for case, found in _of_cases(row)}
 
     def _lasting(self, table: pd.DataFrame) -> pd.Series:
@@ -171,9 +171,9 @@ def setting_key(parameters: Mapping[str, Any]) -> str:
 
 
 def _of_cases(row: Row) -> Iterator[tuple[Mapping[str, Any], dict[str, Any]]]:
-    """Each case of a row of settings in turns, with its times [s] and their median; none of a row that failed."""
+    """Each case of a row of settings in turns, with its times [s]; none of a row that failed."""
     for case, repeats in zip(row.parameters["cases"], row.values.get("repeats_s", ()), strict=False):
-        yield case, {"online_s": statistics.median(repeats), "repeats_s": repeats}
+        yield case, {"online_s": undisturbed(repeats), "repeats_s": repeats}
 
 
 def _cause(result: StudyResult, row: Row) -> str:

@@ -6,14 +6,17 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-__all__ = ["in_turns", "repeated", "timed"]
+import numpy as np
+
+__all__ = ["in_turns", "repeated", "timed", "undisturbed"]
 
 T = TypeVar("T")
 
 REPEAT_BUDGET_S = 2.0  # s; a run that takes longer is timed once
 STEADY_S = 0.3  # s, over which short runs are repeated: a machine's speed varies
-ROUNDS = 25  # of runs in turns
+ROUNDS = 200  # of runs in turns
 TURNS_BUDGET_S = 20.0  # s, after which no further round begins
+UNDISTURBED = 0.25  # share of the shortest times: a machine may be slow for three quarters of the rounds
 
 
 def timed(run: Callable[[], T]) -> tuple[T, float]:
@@ -51,3 +54,11 @@ def in_turns(runs: Sequence[Callable[[], float]]) -> list[tuple[float, ...]]:
             found.append(run())
         order.reverse()
     return [tuple(found) for found in times]
+
+
+def undisturbed(times: Sequence[float]) -> float:
+    """Lower quartile of times in turns: that of a machine which something else slows down now and then.
+
+    The median of such times lies at random among the fast or the slow ones.
+    """
+    return float(np.quantile(times, UNDISTURBED))
