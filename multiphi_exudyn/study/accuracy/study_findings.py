@@ -167,8 +167,9 @@ def _failures(result: StudyResult) -> dict[str, Any]:
 def _times(result: StudyResult) -> dict[str, Any]:
     timed = settings(result).dropna(subset="repeats_s")
     timed = timed[timed.repeats_s.map(len) > 0]
-    spread = timed.repeats_s.map(lambda repeats: max(repeats) / max(min(repeats), TICK)).astype(float)
-    widest = timed.loc[[spread.idxmax()]].iloc[0] if len(timed) else None
+    repeated = timed[~timed.in_turns]  # the others' quartiles do not depend on their longest times
+    spread = repeated.repeats_s.map(lambda repeats: max(repeats) / max(min(repeats), TICK)).astype(float)
+    widest = repeated.loc[[spread.idxmax()]].iloc[0] if len(repeated) else None
     return {
         "spread": None if widest is None else float(spread.max()),
         "widest": None if widest is None else named(widest.method, widest.setting),
