@@ -255,15 +255,14 @@ def test_in_turns_a_change_of_speed_changes_all_runs_alike():
         calls.append(duration)
         return duration * (1 + len(calls) // 7 % 2)
 
-    times = in_turns([lambda: run(1.0), lambda: run(1.05), lambda: run(1.1)])
+    times = in_turns([lambda: run(1.0), lambda: run(1.05), lambda: run(1.1)], 60.0)
     assert [len(each) for each in times] == 3 * [timing.ROUNDS]
     assert calls[:6] == [1.0, 1.05, 1.1, 1.1, 1.05, 1.0]
     assert [undisturbed(each) for each in times] == [1.0, 1.05, 1.1]
 
 
-def test_turns_end_with_their_round_where_they_take_long(monkeypatch):
-    monkeypatch.setattr(timing, "TURNS_BUDGET_S", 0.0)
-    assert in_turns([lambda: 1.0, lambda: 2.0]) == [(1.0,), (2.0,)]
+def test_turns_end_with_their_round_where_they_take_long():
+    assert in_turns([lambda: 1.0, lambda: 2.0], 0.0) == [(1.0,), (2.0,)]
 
 
 @pytest.mark.parametrize(("name", "counts"), [("compliant", False), ("full", True)])

@@ -30,7 +30,7 @@ from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models,
 from multiphi_exudyn.study.running.environment import environment
 from multiphi_exudyn.study.running.runners import ready_model, run_model
 from multiphi_exudyn.study.running.runs import ModelRun, from_arrays, to_arrays
-from multiphi_exudyn.study.running.timing import in_turns
+from multiphi_exudyn.study.running.timing import TURNS_BUDGET_S, in_turns
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.workbench import Setup, prepare
 from multiphi_exudyn.study.sweep.row import Row
@@ -103,7 +103,8 @@ class TimedTurns:
         """Times [s] of every one of the cases, in their order."""
         with kept_back():
             runs = [ready_model(_bench(self.study, case), self.study.model_name(case)) for case in parameters["cases"]]
-            return Outcome({"repeats_s": [list(times) for times in in_turns(runs)]})
+            times = in_turns(runs, TURNS_BUDGET_S / len(self.study.points))
+            return Outcome({"repeats_s": [list(each) for each in times]})
 
 
 @dataclass(frozen=True)

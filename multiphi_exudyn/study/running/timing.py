@@ -15,7 +15,7 @@ T = TypeVar("T")
 REPEAT_BUDGET_S = 2.0  # s; a run that takes longer is timed once
 STEADY_S = 0.3  # s, over which short runs are repeated: a machine's speed varies
 ROUNDS = 200  # of runs in turns
-TURNS_BUDGET_S = 20.0  # s, after which no further round begins
+TURNS_BUDGET_S = 20.0  # s, of all turns of a study
 UNDISTURBED = 0.25  # share of the shortest times: a machine may be slow for three quarters of the rounds
 
 
@@ -40,15 +40,15 @@ def repeated(run: Callable[[], float], first: float, fewest: int) -> tuple[float
     return tuple(repeats)
 
 
-def in_turns(runs: Sequence[Callable[[], float]]) -> list[tuple[float, ...]]:
+def in_turns(runs: Sequence[Callable[[], float]], budget_s: float) -> list[tuple[float, ...]]:
     """Times [s] of several runs, each of which returns its time, as they take turns, forwards and backwards.
 
-    A change of the machine's speed then changes all of them alike.
+    A change of the machine's speed then changes all of them alike. budget_s: after which no further round begins.
     """
     times: list[list[float]] = [[] for _ in runs]
     order, started = list(zip(runs, times, strict=True)), time.perf_counter()
     for number in range(ROUNDS):
-        if number and time.perf_counter() - started > TURNS_BUDGET_S:
+        if number and time.perf_counter() - started > budget_s:
             break
         for run, found in order:
             found.append(run())
