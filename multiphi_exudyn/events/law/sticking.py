@@ -75,6 +75,7 @@ from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves,
 from multiphi_exudyn.mathematics.complementarity.free_rows import ABOVE, BELOW, SIDES, WAITING, product
 from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING
 from multiphi_exudyn.mathematics.complementarity.principal_pivoting import SOLVED, solve
+from multiphi_exudyn.mathematics.complementarity.row_sides import free_balanced_rows
 
 __all__ = ["stick_together"]
 
@@ -142,6 +143,7 @@ def decide_at_rest(ints: Ints, numbers: Numbers, count: int, requests: int) -> i
         if solve(ints, numbers, ints[SMALL_PROBLEM], 1) != SOLVED:
             ints[CAUSE] = UNSETTLED
             return FAILED
+        free_balanced_rows(ints, numbers, ints[SMALL_PROBLEM])
         falling = choose_states(ints, numbers, count, requests)
         fallen += falling
     stick_independent_set(ints, numbers, count)
@@ -241,6 +243,8 @@ def choose_states(ints: Ints, numbers: Numbers, count: int, requests: int) -> in
     Elements that come from slip fall first: the others may then need no more than their static limit, and go on
     sticking. An element that requests slip at its static limit, with a force that would exceed it, falls unless others
     now bear more. An element whose bound is its limit slips there, also if its force is within round-off of the limit.
+    One that needs just a larger static limit, to round-off, sticks: that limit still holds it, and if not for long, it
+    falls by itself.
     """
     states, falling = ints[ints[WORKED + LEVEL] + STATES], 0
     for stuck in range(2):

@@ -50,7 +50,15 @@ from multiphi_exudyn.mathematics.complementarity.free_rows import (
 from multiphi_exudyn.mathematics.complementarity.least_distance import ALIKE, FOLLOWING
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT, ZERO
 
-__all__ = ["accept_dependent_row", "choose_sides", "first_change", "most_violated_row", "scale", "update_violations"]
+__all__ = [
+    "accept_dependent_row",
+    "choose_sides",
+    "first_change",
+    "free_balanced_rows",
+    "most_violated_row",
+    "scale",
+    "update_violations",
+]
 
 
 @compiled
@@ -151,6 +159,21 @@ def is_independent(ints: Ints, numbers: Numbers, problem: int, row: int) -> int:
         numbers[remainder + i] = numbers[ints[problem + UNITS] + row * r + i]
     project_out(ints, numbers, problem, remainder, -1)
     return 1 if size < r and norm(numbers, remainder, r) > INDEPENDENT else 0
+
+
+@compiled
+def free_balanced_rows(ints: Ints, numbers: Numbers, problem: int) -> None:
+    """Make rows of a solution free that are at a bound while w is zero to round-off, the last ones first.
+
+    Whether such a row has come to its bound or to zero w is decided by round-off. Those that depend on free rows keep
+    their bounds.
+    """
+    reach = norm(numbers, ints[problem + X], ints[problem + UNKNOWNS])
+    for k in range(ints[problem + COUNT] - 1, -1, -1):
+        balanced = abs(numbers[ints[problem + RESULTS] + k]) <= FOLLOWING * (numbers[ints[problem + TERMS] + k] + reach)
+        at_bound = ints[ints[problem + SIDES] + k] in (BELOW, ABOVE) and has_range(ints, numbers, problem, k) == 1
+        if balanced and at_bound and is_independent(ints, numbers, problem, k) == 1:
+            add_free_row(ints, problem, k)
 
 
 @compiled
