@@ -180,7 +180,7 @@ def free_balanced_rows(ints: Ints, numbers: Numbers, problem: int) -> None:
 def first_change(ints: Ints, numbers: Numbers, problem: int, driven: int, limit: float) -> float:
     """Return how far the driven row moves until a row, CHANGING, changes its side to CHANGED_TO; itself at zero w.
 
-    Rows that reach zero together with it, as parallel rows do, keep their sides.
+    Of rows that reach zero together to round-off, as parallel ones do, the driven one changes, or else the first one.
     """
     r, shares, way = ints[problem + UNKNOWNS], ints[problem + SHARES], ints[problem + DIRECTION]
     distance, least = limit, INDEPENDENT * norm(numbers, way, r)
@@ -206,7 +206,7 @@ def first_change(ints: Ints, numbers: Numbers, problem: int, driven: int, limit:
         ):
             closing = side * product(numbers, ints[problem + UNITS] + k * r, way, r)
             room = max(-side * numbers[ints[problem + RESULTS] + k], 0.0)
-            if closing > least and room / closing < min(distance, (1.0 - ALIKE) * limit):
+            if closing > least and room / closing < (1.0 - ALIKE) * distance:
                 distance = room / closing
                 ints[problem + CHANGING] = k
                 ints[problem + CHANGED_TO] = BETWEEN
