@@ -94,6 +94,17 @@ def test_is_the_one_of_all_states_that_is_complementary(kind, seed, k, extra, at
     assert np.array_equal(scaled[1], z / scale**3)
 
 
+def test_of_parallel_rows_that_reach_zero_together_the_first_one_is_free_whatever_round_off_says():
+    """The other row pushes w of all of them to zero at once; which of them bears anything is no round-off."""
+    random = np.random.default_rng(5)
+    for _ in range(50):
+        along, levers = random.uniform(0.2, 1.0, size=2) * (-1.0, 1.0), random.uniform(0.3, 3.0, size=3)
+        rows, b = np.array([[1.0, 0.0], *np.outer(levers, along)]), np.r_[-2.0, random.uniform(0.0, 0.3) * levers]
+        _, z, answer, _ = complementary(rows, None, b, np.abs(b), np.zeros(4), np.full(4, 1e3))
+        assert answer == SOLVED
+        assert np.array_equal(z > 0.0, [True, True, False, False])
+
+
 @settings(derandomize=True, max_examples=100, deadline=None)
 @given(st.integers(0, 2**31), st.integers(2, 5), st.integers(3, 12))
 def test_redundant_rows_and_nearly_parallel_ones_are_complementary_too(seed, k, digits):

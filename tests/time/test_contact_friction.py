@@ -450,3 +450,27 @@ def test_contacts_of_constant_pressure_are_blocks(seed):
     for run in runs[1:]:
         assert_allclose(run.displacement(t)[:3], runs[0].displacement(t)[:3], atol=1e-9)
         assert [e.kind for e in run.events] == [e.kind for e in runs[0].events]
+
+
+@pytest.mark.parametrize("element", ["compliant", "viscous"])
+@pytest.mark.parametrize(
+    ("limits", "comes_to_rest"),
+    [((0.3, 0.1), False), ((0.3, 0.3), False), ((1.0, 0.4), False), ((2.0, 1.0), True)],
+)
+def test_two_at_one_place_let_go_together_whatever_round_off_says(limits, comes_to_rest, element):
+    """The second one lets go where both bear their limits: the first one slips on, it does not stick for no time.
+
+    Limits that differ in the last digits change no event.
+    """
+    load, found = mp.HarmonicLoad([1.0, 0.0, 0.0], 5.0, 0.25, -np.pi / 2), set()
+    for digits in itertools.product(range(-2, 3), repeat=2):
+        near = np.array(limits) * (1.0 + np.finfo(float).eps * np.array(digits))
+        structure, elements, pressed = pads([[1.0], [1.0]], near, element=element)
+        run = mp.simulate(mp.MultiPhiModel(structure, elements, modes="all"), 3.0, pressed, loads=[load])
+        found.add(tuple(f"{event.contact} {event.state}" for event in run.events))
+    expected = ["f0 slip+", "f1 stick", "f1 slip+"]
+    if comes_to_rest:
+        expected += ["f0 stick", "f1 idle", "f0 slip-", "f1 stick", "f1 slip-"]
+    else:
+        expected += ["f0 slip-", "f1 slip-"]
+    assert found == {tuple(expected)}

@@ -243,6 +243,39 @@ def test_what_comes_to_rest_stays_while_static_limits_hold_it(force, speed, orde
 
 @pytest.mark.parametrize("scale", [0.9, 1.0, 1.07])
 @pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+def test_what_comes_to_rest_at_its_static_limit_stays_whatever_round_off_says(order, scale):
+    """Limits 0.2, 0.3 and 1, the last one 2 at rest, under a load of 2.5: they can just bear it."""
+    structure = mp.LinearStructure([[1.3]], [[0.0]], points={"m": 0})
+    load, limits = mp.ConstantLoad("m", -2.5 * scale), [(0.2, 0.2), (0.3, 0.3), (1.0, 2.0)]
+    for digits in itertools.product((-1, 0, 1), repeat=3):
+        near = scale * np.array(limits) * (1.0 + np.finfo(float).eps * np.array(digits)[:, None])
+        several = [mp.Friction(f"f{k}", "m", near[k, 0], static_limit=near[k, 1]) for k in order]
+        run = mp.simulate(mp.MultiPhiModel(structure, several, modes="all"), 2.0, velocity=[1.0], loads=[load])
+        assert run.status == "ok"
+        assert_allclose(run.velocity([1.0, 2.0]), 0.0, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("statics", "rows"), [((1.5, 1.5), [[1.0], [1.0]]), ((1.5, 1.0, 1.5), [[1, 0], [1, -1], [0, 1]])]
+)
+def test_equal_static_limits_fall_in_their_order_whatever_round_off_says(statics, rows):
+    """Redundant ones of equal reserve: who is named later falls later. Limits of other last digits change no event."""
+    n, found = len(rows[0]), set()
+    structure, load = mp.LinearStructure(np.eye(n), 4.0 * np.eye(n)), mp.HarmonicLoad(np.ones(n), 5.0, 0.25, -np.pi / 2)
+    for digits in itertools.product((-2, 0, 1), repeat=len(rows)):
+        near = 1.0 + np.finfo(float).eps * np.array(digits)
+        several = [
+            mp.Friction(f"f{k}", row, limit, static_limit=static * limit)
+            for k, (row, limit, static) in enumerate(zip(rows, near, statics, strict=True))
+        ]
+        run = mp.simulate(mp.MultiPhiModel(structure, several, modes="all"), 3.0, loads=[load])
+        found.add((run.status, *(f"{event.contact} {event.state}" for event in run.events)))
+    assert len(found) == 1
+    assert found.pop()[:2] == ("ok", "f0 slip+")
+
+
+@pytest.mark.parametrize("scale", [0.9, 1.0, 1.07])
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
 @pytest.mark.parametrize(("mass", "coupling", "limit"), [(1.0, 0.3, 8.0), (1.0, -0.3, 2.0), (1.3, 0.3, 0.5)])
 def test_who_has_a_static_limit_takes_over_from_one_that_is_at_its_limit_to_round_off(
     mass, coupling, limit, order, scale

@@ -51,6 +51,7 @@ from multiphi_exudyn.events.states.signals import row_sign
 from multiphi_exudyn.events.states.state_arrays import accelerate, acceleration_sizes
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.complementarity.free_rows import norm, product
+from multiphi_exudyn.mathematics.complementarity.least_distance import ALIKE
 from multiphi_exudyn.mathematics.complementarity.principal_pivoting import pose
 
 __all__ = [
@@ -100,6 +101,7 @@ def sort_by_reserve(ints: Ints, numbers: Numbers, count: int) -> None:
     """12. Sort the elements at rest by the reserve of their static limit over their limit, the smallest first.
 
     Of redundant elements the one with the largest reserve then reaches its limit last; the others exert their limit.
+    Reserves that are equal but for round-off keep their order.
     """
     level, sizes = ints[ENTERED_STATE + LEVEL], ints[VALUES]
     n = ints[level + MODES] + ints[CHANNELS]
@@ -109,7 +111,7 @@ def sort_by_reserve(ints: Ints, numbers: Numbers, count: int) -> None:
         row = ints[level + SPEEDS] + ints[ints[HELD_LINKS] + i] * (n + 1)
         size = reserve * pressure(ints, numbers, i) * norm(numbers, row, ints[level + MODES]) if reserve > 0.0 else 0.0
         position = k
-        while position > 0 and numbers[sizes + position - 1] > size:
+        while position > 0 and (1.0 - ALIKE) * numbers[sizes + position - 1] > size:
             numbers[sizes + position] = numbers[sizes + position - 1]
             ints[ints[RESTING_LIST] + position] = ints[ints[RESTING_LIST] + position - 1]
             position -= 1

@@ -72,9 +72,10 @@ from multiphi_exudyn.events.law.redundancy import are_independent, held_links
 from multiphi_exudyn.events.law.switching import open_and_enter
 from multiphi_exudyn.events.states.signals import row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.complementarity.free_rows import ABOVE, BELOW, BETWEEN, SIDES, WAITING, product
+from multiphi_exudyn.mathematics.complementarity.free_rows import ABOVE, BELOW, SIDES, WAITING, product
 from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING
 from multiphi_exudyn.mathematics.complementarity.principal_pivoting import SOLVED, solve
+from multiphi_exudyn.mathematics.complementarity.row_sides import free_balanced_rows
 
 __all__ = ["stick_together"]
 
@@ -142,6 +143,7 @@ def decide_at_rest(ints: Ints, numbers: Numbers, count: int, requests: int) -> i
         if solve(ints, numbers, ints[SMALL_PROBLEM], 1) != SOLVED:
             ints[CAUSE] = UNSETTLED
             return FAILED
+        free_balanced_rows(ints, numbers, ints[SMALL_PROBLEM])
         falling = choose_states(ints, numbers, count, requests)
         fallen += falling
     stick_independent_set(ints, numbers, count)
@@ -241,6 +243,8 @@ def choose_states(ints: Ints, numbers: Numbers, count: int, requests: int) -> in
     Elements that come from slip fall first: the others may then need no more than their static limit, and go on
     sticking. An element that requests slip at its static limit, with a force that would exceed it, falls unless others
     now bear more. An element whose bound is its limit slips there, also if its force is within round-off of the limit.
+    One that needs just a larger static limit, to round-off, sticks: that limit still holds it, and if not for long, it
+    falls by itself.
     """
     states, falling = ints[ints[WORKED + LEVEL] + STATES], 0
     for stuck in range(2):
@@ -269,10 +273,10 @@ def choose_states(ints: Ints, numbers: Numbers, count: int, requests: int) -> in
 
 @compiled
 def stick_independent_set(ints: Ints, numbers: Numbers, count: int) -> None:
-    """12. Let elements whose force is exactly their limit stick, as long as the sticking directions are independent.
+    """12. Let elements at rest without an added force stick, as long as the sticking directions are independent.
 
-    Elements that can bear more come first. An element that cannot bear more slips if another one takes over: only
-    round-off keeps it within its limit.
+    They have a larger static limit, or are idle. An element that bears just its limit, to round-off, and can bear no
+    more keeps slipping: it would stick only to slip at the same instant.
     """
     union, targets, sides = ints[UNION], ints[WISHES], ints[ints[SMALL_PROBLEM] + SIDES]
     for i in range(ints[ELEMENTS]):
@@ -280,13 +284,12 @@ def stick_independent_set(ints: Ints, numbers: Numbers, count: int) -> None:
     for k in range(count):
         if ints[sides + k] == WAITING:
             ints[union + ints[ints[RESTING_LIST] + k]] = 0
-    for side in (WAITING, BETWEEN):
-        for k in range(count):
-            i = ints[ints[RESTING_LIST] + k]
-            if ints[sides + k] == side and ints[union + i] == 0:
-                ints[union + i] = 2
-                if are_independent(ints, numbers, union) == 1:
-                    ints[targets + i] = ints[ints[STICKS] + i]
-                else:
-                    ints[union + i] = 0
-                    ints[targets + i] = ints[ints[KEY] + i] if side == WAITING else ints[targets + i]
+    for k in range(count):
+        i = ints[ints[RESTING_LIST] + k]
+        if ints[sides + k] == WAITING:
+            ints[union + i] = 2
+            if are_independent(ints, numbers, union) == 1:
+                ints[targets + i] = ints[ints[STICKS] + i]
+            else:
+                ints[union + i] = 0
+                ints[targets + i] = ints[ints[KEY] + i]

@@ -20,7 +20,7 @@ from multiphi_exudyn.mathematics.round_off import INDEPENDENT, ZERO
 __all__ = ["FOLLOWING", "Infeasible", "least_distance"]
 
 FOLLOWING = 10 * INDEPENDENT  # of its terms: allowed violation of an inequality that depends on others
-ALIKE = 1e-10  # of the largest violation: equal ones but for round-off, of which the first enters
+ALIKE = 1e-10  # of the larger one: violations, ways or reserves, equal but for round-off; the first comes first
 SETS = 20  # tried for every inequality: far fewer are needed
 
 

@@ -50,7 +50,15 @@ from multiphi_exudyn.mathematics.complementarity.free_rows import (
 from multiphi_exudyn.mathematics.complementarity.least_distance import ALIKE, FOLLOWING
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT, ZERO
 
-__all__ = ["accept_dependent_row", "choose_sides", "first_change", "most_violated_row", "scale", "update_violations"]
+__all__ = [
+    "accept_dependent_row",
+    "choose_sides",
+    "first_change",
+    "free_balanced_rows",
+    "most_violated_row",
+    "scale",
+    "update_violations",
+]
 
 
 @compiled
@@ -154,10 +162,25 @@ def is_independent(ints: Ints, numbers: Numbers, problem: int, row: int) -> int:
 
 
 @compiled
+def free_balanced_rows(ints: Ints, numbers: Numbers, problem: int) -> None:
+    """Make rows of a solution free that are at a bound while w is zero to round-off, the last ones first.
+
+    Whether such a row has come to its bound or to zero w is decided by round-off. Those that depend on free rows keep
+    their bounds.
+    """
+    reach = norm(numbers, ints[problem + X], ints[problem + UNKNOWNS])
+    for k in range(ints[problem + COUNT] - 1, -1, -1):
+        balanced = abs(numbers[ints[problem + RESULTS] + k]) <= FOLLOWING * (numbers[ints[problem + TERMS] + k] + reach)
+        at_bound = ints[ints[problem + SIDES] + k] in (BELOW, ABOVE) and has_range(ints, numbers, problem, k) == 1
+        if balanced and at_bound and is_independent(ints, numbers, problem, k) == 1:
+            add_free_row(ints, problem, k)
+
+
+@compiled
 def first_change(ints: Ints, numbers: Numbers, problem: int, driven: int, limit: float) -> float:
     """Return how far the driven row moves until a row, CHANGING, changes its side to CHANGED_TO; itself at zero w.
 
-    Rows that reach zero together with it, as parallel rows do, keep their sides.
+    Of rows that reach zero together to round-off, as parallel ones do, the driven one changes, or else the first one.
     """
     r, shares, way = ints[problem + UNKNOWNS], ints[problem + SHARES], ints[problem + DIRECTION]
     distance, least = limit, INDEPENDENT * norm(numbers, way, r)
@@ -183,7 +206,7 @@ def first_change(ints: Ints, numbers: Numbers, problem: int, driven: int, limit:
         ):
             closing = side * product(numbers, ints[problem + UNITS] + k * r, way, r)
             room = max(-side * numbers[ints[problem + RESULTS] + k], 0.0)
-            if closing > least and room / closing < min(distance, (1.0 - ALIKE) * limit):
+            if closing > least and room / closing < (1.0 - ALIKE) * distance:
                 distance = room / closing
                 ints[problem + CHANGING] = k
                 ints[problem + CHANGED_TO] = BETWEEN
