@@ -2,7 +2,8 @@
 
 Modes and their exact free and forced response as sums of exponentials; the certified search for the instant at which
 such a sum first falls through zero; functions of time as piecewise exponentials and as pieces of straight lines; the
-small complementarity problem of contact and friction; round-off; functions on flat buffers, compiled or plain.
+small complementarity problem of contact and friction; products of vectors; round-off; functions on flat buffers,
+compiled or plain.
 
-Order: bounded_cache, compiling, round_off, eigenproblems, response, search, complementarity, functions.
+Order: bounded_cache, compiling, round_off, orthonormal, eigenproblems, response, search, complementarity, functions.
 """

@@ -47,7 +47,7 @@ from multiphi_exudyn.events.law.impact_round_off import negligible_speed, speed_
 from multiphi_exudyn.events.states.signals import gap
 from multiphi_exudyn.events.states.state_arrays import copy_state, same_level
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
-from multiphi_exudyn.mathematics.complementarity.free_rows import product
+from multiphi_exudyn.mathematics.orthonormal import scalar_product
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = [
@@ -78,7 +78,7 @@ def row_speed(ints: Ints, numbers: Numbers, state: int, k: int) -> float:
     """Return the gap velocity of a touching contact, zero if it is round-off; ROWS must have been filled."""
     n = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS]
     row = ints[ROWS] + k * n
-    speed = product(numbers, row, ints[state + SPEED], n)
+    speed = scalar_product(numbers, row, numbers, ints[state + SPEED], n)
     return 0.0 if abs(speed) <= RESTING * speed_size(ints, numbers, state, row) else speed
 
 
@@ -116,7 +116,7 @@ def last_bounce(ints: Ints, numbers: Numbers, count: int) -> int:
         restitution, speed = numbers[ints[RESTITUTIONS] + contact], row_speed(ints, numbers, STRUCK, k)
         may_end = has_rebounded(ints, numbers, k) == 1 and restitution < 1.0 and ints[ints[LASTS] + contact] == 0
         numbers[wanted] = 0.0
-        falling = -product(numbers, row, ints[ACCELERATION], n)
+        falling = -scalar_product(numbers, row, numbers, ints[ACCELERATION], n)
         negligible = max(
             negligible_speed(ints, numbers, STRUCK, contact, row), 0.5 * BRIEF * numbers[INSTANT_TIME] * falling
         )
@@ -153,7 +153,7 @@ def mark_last_bounces(ints: Ints, numbers: Numbers) -> None:
                 if ints[ints[CHANGES] + k * CHANGE_WIDTH] == i and numbers[ints[CHANGE_IMPULSES] + k] != 0.0:
                     struck = 1
             phase = ints[WORKED + PHASES] + ints[ints[level + FIRST_EXITS] + i]
-            speed = product(numbers, ints[level + SPEEDS] + i * (n + 1), ints[WORKED + SPEED], n)
+            speed = scalar_product(numbers, ints[level + SPEEDS] + i * (n + 1), numbers, ints[WORKED + SPEED], n)
             round_off = ZERO * numbers[INSTANT_TIME] * speed
             if struck == 1 and ints[phase] == RECOVERING and -gap(ints, numbers, WORKED, i) <= round_off:
                 ints[phase] = ARMED

@@ -50,9 +50,9 @@ from multiphi_exudyn.events.law.phases import first_exit, opening
 from multiphi_exudyn.events.states.signals import row_sign
 from multiphi_exudyn.events.states.state_arrays import accelerate, acceleration_sizes
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
-from multiphi_exudyn.mathematics.complementarity.free_rows import norm, product
 from multiphi_exudyn.mathematics.complementarity.least_distance import ALIKE
 from multiphi_exudyn.mathematics.complementarity.principal_pivoting import pose
+from multiphi_exudyn.mathematics.orthonormal import norm, scalar_product
 
 __all__ = [
     "at_limit",
@@ -140,7 +140,7 @@ def pose_friction_problem(ints: Ints, numbers: Numbers, count: int, requests: in
             high = low
         numbers[ints[LOWEST] + k] = low
         numbers[ints[HIGHEST] + k] = high
-        numbers[ints[VALUES] + k] = product(numbers, row, ints[ACCELERATION], n)
+        numbers[ints[VALUES] + k] = scalar_product(numbers, row, numbers, ints[ACCELERATION], n)
         numbers[ints[VALUE_SIZES] + k] = resting_size(
             numbers, ints[ACCELERATION_TERMS], ints[ACCELERATION_TERMS], row, n
         )
@@ -171,7 +171,11 @@ def pressure(ints: Ints, numbers: Numbers, element: int) -> float:
     if row_sign(ints, numbers, WORKED, signal, 0.0) <= 0:
         return 0.0
     row = ints[signal + ROW]
-    value = product(numbers, row, x, n) + product(numbers, row + n, v, n) + numbers[row + 2 * n]
+    value = (
+        scalar_product(numbers, row, numbers, x, n)
+        + scalar_product(numbers, row + n, numbers, v, n)
+        + numbers[row + 2 * n]
+    )
     return value * numbers[ints[STIFFNESSES] + element] if ints[ints[KINDS] + element] == COMPLIANT else value
 
 

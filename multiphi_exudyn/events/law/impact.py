@@ -54,8 +54,9 @@ from multiphi_exudyn.events.law.impact_round_off import speed_size
 from multiphi_exudyn.events.states.energies import kinetic
 from multiphi_exudyn.events.states.state_arrays import copy_state, measure
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
-from multiphi_exudyn.mathematics.complementarity.free_rows import EXCLUDED_ROWS, EXCLUDING, norm, product
+from multiphi_exudyn.mathematics.complementarity.free_rows import EXCLUDED_ROWS, EXCLUDING
 from multiphi_exudyn.mathematics.complementarity.principal_pivoting import EXCLUDED, UNDECIDED, pose, solve
+from multiphi_exudyn.mathematics.orthonormal import norm, scalar_product
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = ["IMMOVABLE", "RESTING", "add_friction_rows", "collide", "fill_rows", "least_change"]
@@ -115,7 +116,7 @@ def add_friction_rows(
 def slip_sign(ints: Ints, numbers: Numbers, state: int, released: int, row: int) -> int:
     """Return the sign of the velocity along a row after an impact, zero if it is round-off."""
     n, size = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], speed_size(ints, numbers, state, row)
-    speed = product(numbers, row, ints[state + SPEED], n)
+    speed = scalar_product(numbers, row, numbers, ints[state + SPEED], n)
     if abs(speed) <= RESTING * (size + speed_size(ints, numbers, released, row)):
         return 0
     return 1 if speed > 0.0 else -1
@@ -149,7 +150,7 @@ def least_change(
             value += numbers[row + i] * numbers[vector + i]
             terms += abs(numbers[row + i]) * abs(numbers[vector + i])
         for j in range(count if least >= 0 else 0):
-            pushed = numbers[least + j] * product(numbers, row, ints[ROWS] + j * n, r)
+            pushed = numbers[least + j] * scalar_product(numbers, row, numbers, ints[ROWS] + j * n, r)
             value += pushed
             terms += abs(pushed)
         friction_bound = 0.0
@@ -250,7 +251,7 @@ def collide(
     if least_change(ints, numbers, level, contacts, both, rows, ints[state + SPEED], -1, wanted, least, impulses) < 0:
         return FAILED
     for k in range(rows if least >= 0 else 0):
-        numbers[ints[VALUES] + k] = product(numbers, ints[ROWS] + k * n, ints[state + SPEED], n)
+        numbers[ints[VALUES] + k] = scalar_product(numbers, ints[ROWS] + k * n, numbers, ints[state + SPEED], n)
     for k in range(both if least < 0 else 0):
         plastic -= 0.5 * numbers[impulses + k] * numbers[ints[VALUES] + k]
         if wanted >= 0:
@@ -260,7 +261,7 @@ def collide(
     for i in range(r):
         numbers[v + i] += numbers[ints[CHANGE] + i]
     for k in range(both if least < 0 else 0, rows):
-        after = product(numbers, ints[ROWS] + k * n, v, n)
+        after = scalar_product(numbers, ints[ROWS] + k * n, numbers, v, n)
         plastic -= 0.5 * numbers[impulses + k] * (numbers[ints[VALUES] + k] + after)
     stopped = norm(numbers, v, r) <= RESTING * norm(numbers, before, r)
     for i in range(r):

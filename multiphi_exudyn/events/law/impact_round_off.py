@@ -14,7 +14,7 @@ from multiphi_exudyn.events.arrays import (
     SPEED,
 )
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
-from multiphi_exudyn.mathematics.complementarity.free_rows import norm
+from multiphi_exudyn.mathematics.orthonormal import norm
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = ["negligible_speed", "resting_size", "speed_size"]

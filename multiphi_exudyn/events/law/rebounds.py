@@ -53,7 +53,7 @@ from multiphi_exudyn.events.law.phases import first_exit
 from multiphi_exudyn.events.states.energies import kinetic
 from multiphi_exudyn.events.states.signals import rate_sign, row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
-from multiphi_exudyn.mathematics.complementarity.free_rows import norm, product
+from multiphi_exudyn.mathematics.orthonormal import norm, scalar_product
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 
 __all__ = ["clear_last_bounces", "collide_and_rebound", "flag_touching", "repeat_impacts", "set_rebound_speeds"]
@@ -156,7 +156,7 @@ def check_restitutions(ints: Ints, numbers: Numbers, state: int, count: int) -> 
     for k in range(count):
         for j in range(k):
             one, other = ints[ROWS] + k * n, ints[ROWS] + j * n
-            coupling = abs(product(numbers, one, other, r))
+            coupling = abs(scalar_product(numbers, one, numbers, other, r))
             if ints[level + MOBILITY] >= 0 or coupling > INDEPENDENT * norm(numbers, one, r) * norm(numbers, other, r):
                 joined, group = ints[groups + k], ints[groups + j]
                 for i in range(count):

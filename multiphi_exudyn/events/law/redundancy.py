@@ -26,7 +26,7 @@ from multiphi_exudyn.events.arrays import (
 from multiphi_exudyn.events.law.changes import NO_REQUEST, state_without_stick
 from multiphi_exudyn.events.law.phases import is_refused
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
-from multiphi_exudyn.mathematics.complementarity.free_rows import norm
+from multiphi_exudyn.mathematics.orthonormal import norm
 
 __all__ = ["are_independent", "drop_redundant_stick", "held_links", "is_redundant_stick", "keep_independent"]
 

@@ -60,7 +60,8 @@ from multiphi_exudyn.events.states.maps import find_level, find_map, move
 from multiphi_exudyn.events.states.signals import sign_of
 from multiphi_exudyn.events.states.state_arrays import accelerate, acceleration_sizes, copy_state
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.complementarity.free_rows import ABOVE, BELOW, SIDES, norm
+from multiphi_exudyn.mathematics.complementarity.free_rows import ABOVE, BELOW, SIDES
+from multiphi_exudyn.mathematics.orthonormal import norm
 
 __all__ = ["drop_pulled", "find_pressed", "reaction_sign", "same_speed"]
 

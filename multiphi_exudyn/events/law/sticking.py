@@ -72,10 +72,11 @@ from multiphi_exudyn.events.law.redundancy import are_independent, held_links
 from multiphi_exudyn.events.law.switching import open_and_enter
 from multiphi_exudyn.events.states.signals import row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.complementarity.free_rows import ABOVE, BELOW, SIDES, WAITING, product
+from multiphi_exudyn.mathematics.complementarity.free_rows import ABOVE, BELOW, SIDES, WAITING
 from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING
 from multiphi_exudyn.mathematics.complementarity.principal_pivoting import SOLVED, solve
 from multiphi_exudyn.mathematics.complementarity.row_sides import free_balanced_rows
+from multiphi_exudyn.mathematics.orthonormal import scalar_product
 
 __all__ = ["stick_together"]
 
@@ -220,7 +221,7 @@ def zero_resting_speeds(ints: Ints, numbers: Numbers, count: int) -> int:
         row, terms = ints[ROWS] + k * n, 0.0
         for j in range(n):
             terms += abs(numbers[row + j]) * (abs(numbers[v + j]) + numbers[ints[ENTERED_STATE + SWING] + j])
-        numbers[ints[VALUES] + k] = product(numbers, row, v, n)
+        numbers[ints[VALUES] + k] = scalar_product(numbers, row, numbers, v, n)
         numbers[ints[VALUE_SIZES] + k] = terms
         numbers[ints[LOWEST] + k] = -math.inf
         numbers[ints[HIGHEST] + k] = math.inf

@@ -64,7 +64,7 @@ from multiphi_exudyn.events.states.energies import kinetic, lose
 from multiphi_exudyn.events.states.maps import find_level, move
 from multiphi_exudyn.events.states.state_arrays import copy_state
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.complementarity.free_rows import product
+from multiphi_exudyn.mathematics.orthonormal import scalar_product
 
 __all__ = ["close_without_impact", "impact", "record_impact_changes"]
 
@@ -145,7 +145,7 @@ def slip_after_impact(ints: Ints, numbers: Numbers) -> int:
         sticks = ints[ints[STICKS] + i]
         if bears_no_impulse(ints, numbers, i) == 1 and ints[key + i] >= sticks:
             row = ints[level + SPEEDS] + ints[ints[HELD_LINKS] + i] * (n + 1)
-            speed = product(numbers, row, ints[AFTER + SPEED], n)
+            speed = scalar_product(numbers, row, numbers, ints[AFTER + SPEED], n)
             rests = abs(speed) <= RESTING * speed_size(ints, numbers, AFTER, row)
             slips = sticks + (SLIP_FORWARD if speed > 0.0 else SLIP_BACKWARD)
             ints[key + i] = max(ints[before + i], sticks) if rests else slips

@@ -44,7 +44,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.events.states.maps import find_map, map_state
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import scalar_product
+from multiphi_exudyn.mathematics.orthonormal import scalar_product
 
 __all__ = ["add_defect", "add_start_defect", "lacks_struck_defects"]
 

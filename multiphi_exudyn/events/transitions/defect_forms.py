@@ -25,7 +25,7 @@ from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.transition import Transition
 from multiphi_exudyn.levels.base.modal_base import LENGTHS, SQUARES, ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import add_direction, remove_direction, without
+from multiphi_exudyn.mathematics.orthonormal import add_direction, remove_direction, without
 
 __all__ = ["DefectForm", "allowed", "defect_form", "factor", "held_rigidly", "over_omega"]
 __all__ += ["start_form", "struck_defects"]

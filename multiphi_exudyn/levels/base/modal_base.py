@@ -23,7 +23,7 @@ from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.eigenproblems.modes import Modes
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import span
+from multiphi_exudyn.mathematics.orthonormal import span
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.elements.element import Element
 from multiphi_exudyn.mechanics.elements.element_table import ElementTable

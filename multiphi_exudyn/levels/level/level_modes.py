@@ -37,8 +37,8 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.eigenproblems.modes import right_singular_vectors
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import product_error, without
 from multiphi_exudyn.mathematics.eigenproblems.secular_equation import rank_one_modes
+from multiphi_exudyn.mathematics.orthonormal import product_error, without
 
 __all__ = ["level_modes"]
 

@@ -20,7 +20,7 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.modal_base import INTERLACING, ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.eigenproblems.modes import align_signs, has_clusters
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import scalar_product, write_following, write_span
+from multiphi_exudyn.mathematics.orthonormal import scalar_product, write_following, write_span
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = ["LevelRows", "level_rows"]

@@ -20,7 +20,7 @@ from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.base.modal_base import GAPS, SPRINGS, SQUARES, ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import absolute_product, scalar_product
+from multiphi_exudyn.mathematics.orthonormal import absolute_product, scalar_product
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT, ZERO, drop_round_off
 
 __all__ = ["Asymptotic", "gaps_and_strain", "response_of_neutral_level", "static_response"]

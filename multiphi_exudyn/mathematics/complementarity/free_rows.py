@@ -8,9 +8,8 @@ A row at a bound that is tied to a free row, its leader, moves with it: it belon
 
 from __future__ import annotations
 
-import math
-
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
+from multiphi_exudyn.mathematics.orthonormal import norm, scalar_product
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 
 __all__ = [
@@ -21,8 +20,6 @@ __all__ = [
     "factor",
     "fix_row",
     "move_free",
-    "norm",
-    "product",
     "project_out",
     "solve_free_rows",
 ]
@@ -38,24 +35,6 @@ VIOLATIONS, RESULTS, SHARES, MOVES, Q, R, S, COMPONENTS, REMAINDER, DIRECTION, P
 PROBLEM = 41  # ints of the record
 
 BELOW, BETWEEN, ABOVE, WAITING = -1, 0, 1, 2  # sides; WAITING: between bounds, not yet handled
-
-
-@compiled
-def norm(numbers: Numbers, vector: int, count: int) -> float:
-    """Return the length of a vector."""
-    total = 0.0
-    for i in range(count):
-        total += numbers[vector + i] * numbers[vector + i]
-    return math.sqrt(total)
-
-
-@compiled
-def product(numbers: Numbers, one: int, other: int, count: int) -> float:
-    """Return the scalar product of two vectors."""
-    total = 0.0
-    for i in range(count):
-        total += numbers[one + i] * numbers[other + i]
-    return total
 
 
 @compiled
@@ -128,7 +107,7 @@ def factor(ints: Ints, numbers: Numbers, problem: int) -> None:
             numbers[triangle + b * count + a] = 0.0
         for _ in range(2):
             for b in range(a):
-                share = product(numbers, q + b * r, row, r)
+                share = scalar_product(numbers, q + b * r, numbers, row, r)
                 numbers[triangle + b * count + a] += share
                 for i in range(r):
                     numbers[row + i] -= share * numbers[q + b * r + i]
@@ -143,7 +122,7 @@ def factor(ints: Ints, numbers: Numbers, problem: int) -> None:
             if ints[problem + UNITS] == ints[problem + PUSH_UNITS]:
                 numbers[ints[problem + S] + b * count + a] = numbers[triangle + b * count + a]
             else:
-                numbers[ints[problem + S] + b * count + a] = product(numbers, q + b * r, pushed, r)
+                numbers[ints[problem + S] + b * count + a] = scalar_product(numbers, q + b * r, numbers, pushed, r)
 
 
 @compiled
@@ -211,7 +190,7 @@ def move_free(ints: Ints, numbers: Numbers, problem: int, row: int, way: float) 
     is_dependent = size > 0 and (size >= r or norm(numbers, remainder, r) <= INDEPENDENT)
     for i in range(r):
         numbers[direction + i] = 0.0 if is_dependent else numbers[direction + i]
-    return product(numbers, remainder, direction, r)
+    return scalar_product(numbers, remainder, numbers, direction, r)
 
 
 @compiled
@@ -223,7 +202,7 @@ def project_out(ints: Ints, numbers: Numbers, problem: int, vector: int, shares:
     r, q = ints[problem + UNKNOWNS], ints[problem + Q]
     for _ in range(2):
         for b in range(ints[problem + FREE_COUNT]):
-            share = product(numbers, q + b * r, vector, r)
+            share = scalar_product(numbers, q + b * r, numbers, vector, r)
             if shares >= 0:
                 numbers[shares + b] += share
             for i in range(r):
@@ -262,7 +241,7 @@ def solve_free_rows(ints: Ints, numbers: Numbers, problem: int) -> None:
         numbers[components + a] = target / pivot if pivot != 0.0 else 0.0
     for a in range(size):
         numbers[targets + a] = numbers[components + a]
-        numbers[components + a] -= product(numbers, q + a * r, x, r)
+        numbers[components + a] -= scalar_product(numbers, q + a * r, numbers, x, r)
     if ints[problem + UNITS] == ints[problem + PUSH_UNITS]:
         for a in range(size):
             for i in range(r):
@@ -271,7 +250,7 @@ def solve_free_rows(ints: Ints, numbers: Numbers, problem: int) -> None:
     if ints[problem + UNITS] != ints[problem + PUSH_UNITS]:
         push_free(ints, numbers, problem, components, x)
         for a in range(size):
-            difference = numbers[targets + a] - product(numbers, q + a * r, x, r)
+            difference = numbers[targets + a] - scalar_product(numbers, q + a * r, numbers, x, r)
             for i in range(r):
                 numbers[x + i] += difference * numbers[q + a * r + i]
     for a in range(size):

@@ -76,8 +76,6 @@ from multiphi_exudyn.mathematics.complementarity.free_rows import (
     bound,
     fix_row,
     move_free,
-    norm,
-    product,
     push_fixed,
     solve_free_rows,
     update_tied_shares,
@@ -91,6 +89,7 @@ from multiphi_exudyn.mathematics.complementarity.row_sides import (
     scale,
     update_violations,
 )
+from multiphi_exudyn.mathematics.orthonormal import norm, scalar_product
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT, ZERO
 
 __all__ = ["EXCLUDED", "PROBLEM", "SOLVED", "UNDECIDED", "lay_out", "pose", "problem_ints", "problem_numbers", "solve"]
@@ -219,7 +218,7 @@ def solve_single_row(ints: Ints, numbers: Numbers, problem: int) -> int:
     """Solve a single row without a leader: the z of zero w, or the bound before it."""
     r, row, pushes = ints[problem + UNKNOWNS], ints[problem + ROWS], ints[problem + PUSHES]
     value, low, high = numbers[ints[problem + VALUES]], numbers[ints[problem + LOWS]], numbers[ints[problem + HIGHS]]
-    square, z = product(numbers, row, pushes, r), min(max(0.0, low), high)
+    square, z = scalar_product(numbers, row, numbers, pushes, r), min(max(0.0, low), high)
     if abs(value + square * z) > ZERO * numbers[ints[problem + SIZES]]:
         if square <= 0.0 and ((value < 0.0 and high == math.inf) or (value > 0.0 and low == -math.inf)):
             ints[problem + EXCLUDING] = 1

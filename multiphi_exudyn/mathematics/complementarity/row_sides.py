@@ -43,11 +43,10 @@ from multiphi_exudyn.mathematics.complementarity.free_rows import (
     add_free_row,
     bound,
     factor,
-    norm,
-    product,
     project_out,
 )
 from multiphi_exudyn.mathematics.complementarity.least_distance import ALIKE, FOLLOWING
+from multiphi_exudyn.mathematics.orthonormal import norm, scalar_product
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT, ZERO
 
 __all__ = [
@@ -204,7 +203,7 @@ def first_change(ints: Ints, numbers: Numbers, problem: int, driven: int, limit:
             and numbers[ints[problem + VIOLATIONS] + k] == 0.0
             and (is_led or has_range(ints, numbers, problem, k) == 1)
         ):
-            closing = side * product(numbers, ints[problem + UNITS] + k * r, way, r)
+            closing = side * scalar_product(numbers, ints[problem + UNITS] + k * r, numbers, way, r)
             room = max(-side * numbers[ints[problem + RESULTS] + k], 0.0)
             if closing > least and room / closing < (1.0 - ALIKE) * distance:
                 distance = room / closing

@@ -24,7 +24,7 @@ import scipy.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import scalar_product
+from multiphi_exudyn.mathematics.orthonormal import scalar_product
 
 __all__ = [
     "FIRST_SHIFT",

@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import remove_direction
+from multiphi_exudyn.mathematics.orthonormal import remove_direction
 
 __all__ = ["rank_one_modes"]
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
-from multiphi_exudyn.mathematics.eigenproblems.orthonormal import clear_products
+from multiphi_exudyn.mathematics.orthonormal import clear_products
 
 __all__ = ["StartProjection"]
 

@@ -13,6 +13,7 @@ __all__ = [
     "absolute_product",
     "add_direction",
     "clear_products",
+    "norm",
     "product_error",
     "remove_direction",
     "scalar_product",
@@ -52,6 +53,12 @@ def scalar_product(a: Numbers, first: int, b: Numbers, second: int, m: int) -> f
     for i in range(m - m % 4, m):
         sum_0 += a[first + i] * b[second + i]
     return (sum_0 + sum_1) + (sum_2 + sum_3)
+
+
+@compiled
+def norm(numbers: Numbers, vector: int, m: int) -> float:
+    """Return the length of a vector (m,)."""
+    return math.sqrt(scalar_product(numbers, vector, numbers, vector, m))
 
 
 @compiled
@@ -111,7 +118,7 @@ def add_direction(vectors: Numbers, vector: int, length: float, scratch: Numbers
             share = scalar_product(scratch, basis + p * m, scratch, added, m)
             for i in range(m):
                 scratch[added + i] -= share * scratch[basis + p * m + i]
-    size = math.sqrt(scalar_product(scratch, added, scratch, added, m))
+    size = norm(scratch, added, m)
     for i in range(m):
         scratch[added + i] *= 1.0 / size if size > INDEPENDENT else 0.0
     return 1 if size > INDEPENDENT else 0
