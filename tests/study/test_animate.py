@@ -25,6 +25,8 @@ from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
 
+pytestmark = pytest.mark.usefixtures("few_elements")
+
 FULL = {"kind": "full", "name": "full", "elements": 4, "step": 1e-4}
 PLAIN = changed(["outputs", "interval"], 1e-4)  # closures between two samples of 1 ms would be averaged
 WITH_FULL = changed(["models"], [*BEAM["models"], FULL], PLAIN) | {"comparison": {"reference": "full"}}

