@@ -75,7 +75,7 @@ def solved(given, scale=1.0, run=None):
 
 
 @pytest.mark.parametrize("kind", [PLAIN, SKEW, COULOMB])
-@settings(derandomize=True, max_examples=100, deadline=None)
+@settings(derandomize=True, max_examples=50, deadline=None)
 @given(
     st.integers(0, 2**31), st.integers(2, 5), st.integers(0, 2), st.sampled_from([0.0, 0.4]), st.sampled_from([-9, 9])
 )
@@ -94,7 +94,7 @@ def test_is_the_one_of_all_states_that_is_complementary(kind, seed, k, extra, at
     assert np.array_equal(scaled[1], z / scale**3)
 
 
-@settings(derandomize=True, max_examples=100, deadline=None)
+@settings(derandomize=True, max_examples=50, deadline=None)
 @given(st.integers(0, 2**31), st.integers(2, 5), st.integers(3, 12))
 def test_redundant_rows_and_nearly_parallel_ones_are_complementary_too(seed, k, digits):
     """Friction on few unknowns: what x is does not hang on which of the rows bears what."""

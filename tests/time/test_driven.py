@@ -64,8 +64,8 @@ class TestAgainstAnIntegratorAt1e12:
         load = mp.SampledLoad("m1", times, forces)
         self.check(damping, [load], lambda t: np.interp(t, times, forces, right=0.0), 1e-10, breaks=times, longest=0.25)
 
-    @pytest.mark.parametrize("law", ["linear", "logarithmic"])
-    def test_sweep(self, damping, law):
+    def test_sweep(self, damping):
+        law = "linear" if damping is None else "logarithmic"
         load = mp.SweepLoad("m1", 1.0, 0.1, 2.0, 20.0, law, tolerance=1e-9)
         self.check(damping, [load], lambda t: math.cos(load.course.phase(np.array([t]))[0]), 1e-9)
 
