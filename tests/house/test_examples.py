@@ -168,7 +168,7 @@ def test_coupled_body(capsys, monkeypatch, tmp_path):
     example, picture = load("coupled_body"), tmp_path / "coupled.png"
     monkeypatch.setattr(example, "CASES", example.CASES[1:4:2])  # others: test_interface.py
     monkeypatch.setattr(example, "T_END", 0.25)
-    monkeypatch.setattr(example, "STEPS", example.STEPS[:5:2])
+    monkeypatch.setattr(example, "STEPS", example.STEPS[:5:4])
     monkeypatch.setattr(example, "FINE", 2.5e-5)
     monkeypatch.setattr(example, "REPEATS", 1)
     found = example.main([str(picture)])
@@ -186,7 +186,7 @@ def test_jointed_body(capsys, monkeypatch, tmp_path):
     example, picture = load("jointed_body"), tmp_path / "jointed.png"
     monkeypatch.setattr(example, "CASES", example.CASES[:1])
     monkeypatch.setattr(example, "T_END", 0.12)
-    monkeypatch.setattr(example, "STEPS", example.STEPS[::2])
+    monkeypatch.setattr(example, "STEPS", example.STEPS[::4])
     monkeypatch.setattr(example, "FINE", 2.5e-5)
     found = example.main([str(picture)])
     for runs in found.values():

@@ -84,7 +84,7 @@ class TestRandomModels:
 
 class TestRig:
     @pytest.mark.parametrize("stiffness", [1e6, math.inf])
-    @pytest.mark.parametrize("modes", [1, 2, 3, 6, 12, "all"])
+    @pytest.mark.parametrize("modes", [1, 3, 6, 12, "all"])
     def test_agrees(self, stiffness, modes):
         model, start = rig(stiffness, modes, elements=57 if modes != "all" else 8)
         expected, found = both(model, 0.2, displacement=start)

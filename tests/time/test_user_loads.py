@@ -140,7 +140,8 @@ class TestManyPieces:
         refused(ValueError, begins, mp.simulate, model, 1.0, loads=[load])
 
     def test_a_sweep_over_many_decades_is_bounded_before_it_begins(self, refused, monkeypatch):
-        monkeypatch.setattr(excitation, "MOST_EFFORT", 2**14)
+        """Its pieces take more effort than those of samples, of which there might be so many."""
+        monkeypatch.setattr(excitation, "MOST_EFFORT", 2**17)
         load = mp.SweepLoad("m0", 1.0, 1.0, 1e7, 100.0)
         model = mp.MultiPhiModel(chain(1), modes="all")
         refused(ValueError, "loads: got 57757 pieces", mp.simulate, model, 100.0, loads=[load])
