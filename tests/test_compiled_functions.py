@@ -343,10 +343,14 @@ def test_a_few_lines_are_compiled_by_one_process(monkeypatch):
 
 
 @pytest.mark.usefixtures("two_processes")
-def test_processes_share_out_functions_by_their_work():
+def test_processes_share_out_functions_by_their_work(monkeypatch):
+    elsewhere, compile_in_process = [], compilation.compile_in_process
+    monkeypatch.setattr(
+        compilation, "compile_in_process", lambda share: elsewhere.append(compile_in_process(share)) or elsewhere[-1]
+    )
     assert compilation.work_shares([square, turn, total]) == [[total], [turn, square]]
-    assert compilation.compile_in_process([turn, square]).keys() == {turn, square}
     assert Entry(total)(*buffers(), 4, 1.5) == pytest.approx(total(*buffers(), 4, 1.5), rel=1e-15)
+    assert [set(compiled_there) for compiled_there in elsewhere] == [{turn, square}]
 
 
 def test_sharing_out_costs_a_look_at_every_function(monkeypatch):

@@ -14,29 +14,33 @@ from random_campaign import apart, differences, judged, main
 import multiphi_exudyn as mp
 
 LIGHT = dict.fromkeys(KINDS, 3) | {
-    "harmonic": 4,
+    "harmonic": 10,
+    "sweeps": 4,
+    "several": 4,
+    "viscous": 6,
+    "tables": 2,
     "functions": 4,
     "units": 0,
     "moving stops": 4,
     "moving bases": 4,
     "rigid": 0,
-    "laws": 5,
-    "assembled": 4,
-    "clamps": 4,
-    "sampled": 1,
+    "laws": 6,
+    "assembled": 7,
+    "clamps": 0,
+    "restarts": 10,
     "truncated": 0,
-    "friction": 0,
-    "friction blocks": 1,
+    "friction": 2,
+    "friction blocks": 5,
     "jenkins": 11,
     "friction loads": 1,
     "friction contacts": 6,
     "friction impacts": 0,
-    "contact friction": 1,
-    "rigid friction": 2,
+    "contact friction": 9,
+    "rigid friction": 8,
     "friction limits": 1,
-    "friction free": 1,
+    "friction free": 5,
     "friction units": 9,
-    "friction redundant": 0,
+    "friction redundant": 8,
 }  # quick ones in which something happens; random_campaign.py runs many
 
 
@@ -53,7 +57,26 @@ def test_round_off_of_a_scene_at_rest_is_no_answer_that_processors_could_differ_
     assert not any(values)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "functions",
+        "moving stops",
+        "moving bases",
+        "viscous",
+        "tables",
+        "truncated",
+        "redundant",
+        "clamps",
+        "restitution",
+        "friction blocks",
+        "jenkins",
+        "contact friction",
+        "rigid friction",
+        "friction units",
+        "friction redundant",
+    ],
+)
 def test_the_loop_as_plain_python_gives_the_same_answer(kind):
     model, end, x, v, loads = scaled(scene_of(kind, LIGHT[kind]))
     runs = [mp.simulate(model, end, x, v, loads, compiled=compiled) for compiled in (None, False)]
@@ -149,11 +172,6 @@ def test_a_spring_falls_from_its_static_limit_and_sticks_again():
 def test_a_slip_between_bounces_may_be_shorter_than_they_are():
     """Brute force looked no sooner than 6 ns after an impact, when the slip that it makes is over, and gave up."""
     assert judged("rigid friction", 190263)[0] == [("ok", "")]
-
-
-def test_bounces_end_wherever_they_are_looked_at():
-    """After a bounce too short for the first look brute force saw its contact at zero again and again, and gave up."""
-    assert judged("rigid friction", 430066)[0] == [("ok", "")]
 
 
 @pytest.mark.parametrize(

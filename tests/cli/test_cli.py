@@ -15,6 +15,7 @@ from multiphi_exudyn.cli import compare_command
 from multiphi_exudyn.cli.main import THREAD_SETTINGS, parser
 from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.running import reduced_runner
+from multiphi_exudyn.study.scene import workbench
 from multiphi_exudyn.study.scene.scenes import shipped_scenes
 
 FILES = {"report.html", "histories.npz", "summary.json"}
@@ -25,6 +26,7 @@ def scene(tmp_path, monkeypatch):
     """A small scene's file, in an empty working directory, without the seconds that import_times() takes."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(compare_command, "import_times", dict)
+    monkeypatch.setattr(workbench, "ELEMENTS", 16)
     return write(tmp_path / "small.toml", BEAM)
 
 
@@ -49,19 +51,17 @@ def test_compare_writes_three_whole_files_and_says_where(scene, tmp_path, capsys
         assert arrays["all/point/tip"].shape == arrays["time"].shape == (101,)
 
 
-def test_the_reduced_error_falls_with_the_number_of_modes(scene, tmp_path):
+def test_modes_end_time_and_folder_are_taken_from_the_command_line(scene, tmp_path):
+    """And the reduced error falls with the number of modes."""
     errors = []
     for modes in ("3", "8"):
-        assert cli.main(["compare", scene, "--modes", modes, "--out", modes]) == 0
-        content = json.loads((tmp_path / modes / "summary.json").read_text("utf-8"))
-        errors.append(content["errors"][f"r{modes}"]["0.1"]["tip"])
+        folder = tmp_path / "a" / modes
+        assert cli.main(["compare", scene, "--modes", modes, "--t-end", "0.05", "--out", str(folder)]) == 0
+        content = json.loads((folder / "summary.json").read_text("utf-8"))
+        errors.append(content["errors"][f"r{modes}"]["0.05"]["tip"])
+        with np.load(folder / "histories.npz") as arrays:
+            assert arrays["time"][-1] == pytest.approx(0.05)
     assert errors[1] < 0.2 * errors[0]
-
-
-def test_end_time_and_folder_are_taken_from_the_command_line(scene, tmp_path):
-    assert cli.main(["compare", scene, "--t-end", "0.05", "--out", str(tmp_path / "a" / "b")]) == 0
-    with np.load(tmp_path / "a" / "b" / "histories.npz") as arrays:
-        assert arrays["time"][-1] == pytest.approx(0.05)
 
 
 def test_a_failed_model_is_exit_code_1_and_still_a_report(scene, tmp_path, monkeypatch, capsys):

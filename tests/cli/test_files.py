@@ -115,6 +115,8 @@ def test_a_study_of_gap_stiffness_and_frequency_from_the_templates_alone(folder,
     told(capsys, "new", "study")
     text = (folder / "study.toml").read_text()
     (folder / "study.toml").write_text(text.replace("timing = true", "timing = false").replace("[4, 8, 16]", "[8]"))
+    text = (folder / "scene.toml").read_text()
+    (folder / "scene.toml").write_text(text.replace("t_end = 0.5", "t_end = 0.3").replace("1e-4 # s", "1e-3 # s"))
     code, _, _ = told(capsys, "study", "study.toml", "--quick", "--on", "serial")
     assert code == 0
     report = (folder / "multiphi-study-quick" / "report.html").read_text()

@@ -34,7 +34,6 @@ def started_moved(seed, kind, moved, truncated):
     return mp.simulate(model, 0.5, displacement=x, velocity=random.normal(size=n), loads=loads)
 
 
-@pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("moved", ["stop", "base"])
 @pytest.mark.parametrize(("kind", "truncated"), CASES)
 def test_the_ledger_closes_whatever_stop_has_moved_at_the_start(kind, moved, truncated):

@@ -43,7 +43,7 @@ def scale_of(run):
 
 
 class TestWhateverTheScene:
-    @settings(max_examples=60)
+    @settings(max_examples=30)
     @given(st.integers(0, 2**31), st.sampled_from(DAMPINGS), st.booleans(), st.booleans(), st.booleans())
     def test_the_ledger_closes_and_a_failure_names_its_cause(self, seed, damping, rigid_body, truncated, loaded):
         _, run = random_run(seed, damping=damping, rigid_body=rigid_body, truncated=truncated, loaded=loaded)
@@ -53,7 +53,7 @@ class TestWhateverTheScene:
         assert run.ledger.damping >= -1e-10 * scale_of(run)
         assert run.status == "ok" or run.message.startswith("at t = ")
 
-    @settings(max_examples=50)
+    @settings(max_examples=25)
     @given(st.integers(0, 2**31), st.sampled_from(DAMPINGS), st.booleans(), st.booleans())
     def test_with_all_modes_the_laws_of_contact_hold(self, seed, damping, rigid_body, loaded):
         m, run = random_run(seed, damping=damping, rigid_body=rigid_body, truncated=False, loaded=loaded)
@@ -73,7 +73,7 @@ class TestWhateverTheScene:
                 law = contact.stiffness * np.maximum(0.0, -gap)
                 assert_allclose(force, law, atol=1e-9 * contact.stiffness * size)
 
-    @settings(max_examples=30)
+    @settings(max_examples=20)
     @given(st.integers(0, 2**31), st.booleans())
     def test_with_all_modes_energy_never_rises(self, seed, rigid_body):
         _, run = random_run(seed, rigid_body=rigid_body, truncated=False)
@@ -81,7 +81,7 @@ class TestWhateverTheScene:
         assert np.max(np.diff(energies)) <= 1e-9 * run.ledger.initial
         assert energies[0] <= run.ledger.initial * (1 + 1e-12)
 
-    @settings(max_examples=30)
+    @settings(max_examples=20)
     @given(st.integers(0, 2**31), st.sampled_from(DAMPINGS), st.booleans())
     def test_a_truncated_rigid_contact_never_pulls(self, seed, damping, rigid_body):
         m, run = random_run(seed, damping=damping, rigid_body=rigid_body, kind="rigid")

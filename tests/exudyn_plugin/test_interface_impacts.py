@@ -51,7 +51,7 @@ from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedIner
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")
 
 COUPLING = 0.25  # kg, between neighbours: an impact on the second mass moves the others
-STEPS = END / np.array([250, 400, 640, 1000, 2500])  # s
+STEPS = END / np.array([250, 400, 1000, 2500])  # s
 ORDER = 1.5  # at least, fitted to all steps; an event's place in its step scatters errors by 3
 
 
@@ -81,8 +81,7 @@ def on_point(model, attach, at="m2", matched=True, **given):
     return shown
 
 
-@pytest.mark.parametrize("matched", [False, True], ids=["plain", "matched"])
-@pytest.mark.parametrize("attach", [mass_on, mass_tied])
+@pytest.mark.parametrize(("attach", "matched"), [(mass_on, True), (mass_tied, False), (mass_tied, True)])
 def test_a_mass_on_a_point_is_struck_with_the_structure(attach, matched):
     native = mp.simulate(chain(math.inf, COUPLING, added_mass=MASS), END, displacement=START)
     assert sum(event.impulse > 0.05 for event in native.events) >= 5

@@ -35,6 +35,8 @@ HEAVY = {
     "h5py": ("multiphi_exudyn/mechanics/files/array_files.py",),
     "pyyeti": ("multiphi_exudyn/mechanics/files/array_files.py",),
 }
+POSIX = ("fcntl", "grp", "posix_ipc", "pty", "pwd", "resource", "syslog", "termios", "tty")
+GUARDED = {"multiphi_exudyn/study/sweep/executors.py": {"fcntl"}}  # behind `if sys.platform == "linux"`
 WITH_NUMBA = (  # may be imported inside a function, as numba may
     "multiphi_exudyn.mathematics.compiling.compilation",
     "multiphi_exudyn.mathematics.compiling.machine_code",
@@ -61,6 +63,11 @@ PACKAGES = sorted(name for name, path in NAMES.items() if path.name == "__init__
 @functools.cache
 def tree(path: Path) -> ast.Module:
     return ast.parse(path.read_text())
+
+
+def importing(root: ast.AST) -> Iterator[ast.AST]:
+    """Nodes that may import something."""
+    return (node for node in ast.walk(root) if isinstance(node, (ast.Import, ast.ImportFrom, ast.Call)))
 
 
 @functools.cache
@@ -91,7 +98,7 @@ def imported(node: ast.AST) -> Iterator[str]:
 @functools.cache
 def imports_of(path: Path) -> frozenset[str]:
     """Full names of all that a file imports."""
-    return frozenset(name for node in ast.walk(tree(path)) for name in imported(node))
+    return frozenset(name for node in importing(tree(path)) for name in imported(node))
 
 
 def module_of(name: str) -> str | None:
@@ -187,11 +194,17 @@ def test_a_heavy_package_is_imported_in_its_own_room_only(package):
         assert package not in names or inside, f"{path} imports {package}"
 
 
+def test_posix_modules_are_imported_where_they_are_guarded_only():
+    for path in sources():
+        names = {name.split(".")[0] for name in imports_of(path)}
+        assert names & set(POSIX) == GUARDED.get(path.relative_to(ROOT).as_posix(), set()), path
+
+
 def test_nothing_light_is_imported_inside_a_function():
     for module in NAMES.keys() - set(LATE):
         for function in ast.walk(tree(NAMES[module])):
             if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef)):
-                names = {name for node in ast.walk(function) for name in imported(node)}
+                names = {name for node in importing(function) for name in imported(node)}
                 light = {name for name in names if name.split(".")[0] not in HEAVY and not name.startswith(WITH_NUMBA)}
                 assert not light, f"{module}: {function.name} imports {light}"
 

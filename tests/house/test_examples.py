@@ -92,7 +92,7 @@ def test_friction_in_exudyn(capsys, monkeypatch, tmp_path):
     monkeypatch.setattr("sys.argv", ["friction_in_exudyn.py", str(tmp_path / "ring.png")])
     example = load("friction_in_exudyn")
     monkeypatch.setattr(example, "STEPS", (4e-4, 1e-4))
-    monkeypatch.setattr(example, "T_END", 0.2)
+    monkeypatch.setattr(example, "T_END", 0.25)
     found = example.main()
     time = found.full[1e-4].time
     assert found.error({name: found.reduced.at(name, time) for name in example.POINTS}) < 2e-3
@@ -117,7 +117,7 @@ def test_first_second_frequencies(capsys, monkeypatch, tmp_path):
     slower = np.sin(2 * np.pi * 6.0 * time) + 0.1 * np.sin(2 * np.pi * 37.0 * time)
     assert example.rates(time, slower) == pytest.approx(6.0, rel=0.01)
     shipped = Path(cases.__file__).parent / "shipped" / "clamp.toml"
-    text = shipped.read_text().replace("elements = 12, step = 2e-5", "elements = 8, step = 1e-4")  # of the full beam
+    text = shipped.read_text().replace("elements = 12, step = 2e-5", "elements = 6, step = 2e-4")  # of the full beam
     (tmp_path / "clamp.toml").write_text(text)
     monkeypatch.setattr(example, "STUDIES", {str(tmp_path / "clamp.toml"): "rotation [N m/rad]"})
     (found,) = example.main(["--quick", str(picture)]).values()
@@ -168,7 +168,7 @@ def test_coupled_body(capsys, monkeypatch, tmp_path):
     example, picture = load("coupled_body"), tmp_path / "coupled.png"
     monkeypatch.setattr(example, "CASES", example.CASES[1:4:2])  # others: test_interface.py
     monkeypatch.setattr(example, "T_END", 0.25)
-    monkeypatch.setattr(example, "STEPS", example.STEPS[:5:2])
+    monkeypatch.setattr(example, "STEPS", example.STEPS[:5:4])
     monkeypatch.setattr(example, "FINE", 2.5e-5)
     monkeypatch.setattr(example, "REPEATS", 1)
     found = example.main([str(picture)])
@@ -184,9 +184,9 @@ def test_coupled_body(capsys, monkeypatch, tmp_path):
 
 def test_jointed_body(capsys, monkeypatch, tmp_path):
     example, picture = load("jointed_body"), tmp_path / "jointed.png"
-    monkeypatch.setattr(example, "CASES", example.CASES[:2])
+    monkeypatch.setattr(example, "CASES", example.CASES[:1])
     monkeypatch.setattr(example, "T_END", 0.12)
-    monkeypatch.setattr(example, "STEPS", example.STEPS[::2])
+    monkeypatch.setattr(example, "STEPS", example.STEPS[::4])
     monkeypatch.setattr(example, "FINE", 2.5e-5)
     found = example.main([str(picture)])
     for runs in found.values():
@@ -196,7 +196,7 @@ def test_jointed_body(capsys, monkeypatch, tmp_path):
         assert runs.small_error < 3e-3
         assert len(runs.small.histories.events) >= 2
     assert picture.stat().st_size > 10_000
-    assert capsys.readouterr().out.count("apart") == 2
+    assert capsys.readouterr().out.count("apart") == 1
 
 
 def test_vary_a_body(capsys, monkeypatch, tmp_path):

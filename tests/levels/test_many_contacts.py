@@ -64,7 +64,7 @@ class TestFewModesOfALevel:
 
     @pytest.mark.parametrize("stiffness", [10.0, 1e6, math.inf])
     @pytest.mark.parametrize("twins", [False, True])
-    @pytest.mark.parametrize("closed", [(7,), (7, 30), (3, 4, 5), (0, 9, 20, 39)])
+    @pytest.mark.parametrize("closed", [(7,), (3, 4, 5), (0, 9, 20, 39)])
     def test_of_a_few_contacts_take_no_singular_values_and_no_iterations(self, monkeypatch, stiffness, twins, closed):
         base = bed(stiffness, n=80 if twins else 160, twins=twins).base
         full = build_level(base, closed)
@@ -76,7 +76,7 @@ class TestFewModesOfALevel:
         assert np.linalg.norm(few.vectors - wanted @ (wanted.T @ few.vectors), 2) < 1e-10
 
     @pytest.mark.parametrize("stiffness", [10.0, 1e6, math.inf])
-    @pytest.mark.parametrize("aside", [0.0, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3])
+    @pytest.mark.parametrize("aside", [0.0, 1e-15, 1e-11, 1e-7, 1e-3])
     def test_one_contact_in_the_middle_of_a_symmetric_structure(self, stiffness, aside):
         """Of a string held there every mode of one half is a pair; a little aside round-off would mix the two."""
         middle = np.zeros(159)

@@ -75,7 +75,7 @@ def solved(given, scale=1.0, run=None):
 
 
 @pytest.mark.parametrize("kind", [PLAIN, SKEW, COULOMB])
-@settings(derandomize=True, max_examples=100, deadline=None)
+@settings(derandomize=True, max_examples=50, deadline=None)
 @given(
     st.integers(0, 2**31), st.integers(2, 5), st.integers(0, 2), st.sampled_from([0.0, 0.4]), st.sampled_from([-9, 9])
 )
@@ -105,7 +105,7 @@ def test_of_parallel_rows_that_reach_zero_together_the_first_one_is_free_whateve
         assert np.array_equal(z > 0.0, [True, True, False, False])
 
 
-@settings(derandomize=True, max_examples=100, deadline=None)
+@settings(derandomize=True, max_examples=50, deadline=None)
 @given(st.integers(0, 2**31), st.integers(2, 5), st.integers(3, 12))
 def test_redundant_rows_and_nearly_parallel_ones_are_complementary_too(seed, k, digits):
     """Friction on few unknowns: what x is does not hang on which of the rows bears what."""

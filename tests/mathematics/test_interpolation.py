@@ -23,7 +23,7 @@ def inner(times):
 
 
 class TestNarrowFunctions:
-    @pytest.mark.parametrize("width", [3e-5, 3e-4])
+    @pytest.mark.parametrize("width", [3e-5])
     def test_none_of_forty_pulses_is_missed_or_refused_wherever_it_is(self, width):
         for middle in places(0, 40):
             history = Smooth(lambda t, middle=middle: np.exp(-(((t - middle) / width) ** 2))).history(END)
@@ -60,8 +60,10 @@ class TestNarrowFunctions:
 
 
 class TestJumps:
-    @pytest.mark.parametrize("place", [0.1, 1 / math.pi, 1.0, 1e-5, END - 1e-5])
-    @pytest.mark.parametrize("scale", SCALES)
+    @pytest.mark.parametrize(
+        ("place", "scale"),
+        [*((place, 1.0) for place in (0.1, 1 / math.pi, 1.0, 1e-5, END - 1e-5)), *((0.1, scale) for scale in SCALES)],
+    )
     def test_a_step_is_located_to_round_off_and_costs_one_piece(self, place, scale):
         for function in (
             lambda t: 5 if t < place * scale else 0,

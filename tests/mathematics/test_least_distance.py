@@ -54,7 +54,7 @@ def solved(solve, rows, vector, free):
 
 
 @both
-@settings(derandomize=True, max_examples=150, deadline=None)
+@settings(derandomize=True, max_examples=75, deadline=None)
 @given(
     st.integers(0, 2**31),
     st.sampled_from(KINDS),
@@ -106,7 +106,7 @@ def test_of_rows_that_are_parallel_to_1e_3_and_less_hardly_any_are_refused(solve
 
 
 @both
-@settings(derandomize=True, max_examples=80, deadline=None)
+@settings(derandomize=True, max_examples=40, deadline=None)
 @given(st.integers(0, 2**31), st.sampled_from(KINDS[:-1]), st.integers(1, 5), st.integers(1, 3))
 def test_fails_where_stops_exclude_each_other_and_only_there(solve, seed, kind, k, r):
     """Whether there is an admissible velocity is judged by linear programming."""
@@ -118,7 +118,7 @@ def test_fails_where_stops_exclude_each_other_and_only_there(solve, seed, kind, 
 
 
 @both
-@settings(derandomize=True, max_examples=80, deadline=None)
+@settings(derandomize=True, max_examples=40, deadline=None)
 @given(st.integers(0, 2**31), st.sampled_from(KINDS[:-1]), st.integers(1, 5), st.integers(1, 5))
 def test_is_the_shortest(solve, seed, kind, k, r):
     random = np.random.default_rng(seed)

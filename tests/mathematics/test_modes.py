@@ -46,6 +46,7 @@ def free_beam(elements, *, scale=1.0):
 
 
 @functools.cache
+@functools.cache
 def free_beam_modes(elements, *, scale=1.0):
     """That beam and all its modes."""
     structure = free_beam(elements, scale=scale)
@@ -180,7 +181,7 @@ class TestLowestModes:
         found = lowest_modes(mass, stiffness, 9, np.zeros((0, 750))).modes
         assert_allclose(found.omega, np.repeat(chain_frequencies(250, ends=2)[:3], 3), rtol=1e-11)
 
-    @pytest.mark.parametrize("copies", range(2, 25))
+    @pytest.mark.parametrize("copies", [2, 3, 4, 5, 7, 10, 13, 20])
     def test_no_copy_of_a_mode_is_missed(self, copies):
         """Equal chains side by side, looked for in numbers below and above that of the copies."""
         for n, count in ((30, 3), (47, 10)) if copies % 2 else ((30, 10), (47, 3)):

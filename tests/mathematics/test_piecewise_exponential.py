@@ -120,7 +120,7 @@ def test_pieces_of_a_sweep_follow_its_change_of_frequency_not_its_frequency():
     assert history.pieces <= 512
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(st.integers(0, 2**31), st.sampled_from([1e-4, 1e-8, 1e-11]), st.floats(1e-6, 1e6), st.floats(1e-3, 1e4))
 def test_whatever_the_smooth_function_the_tolerance_holds_between_all_points(seed, tolerance, size, end):
     random = np.random.default_rng(seed)

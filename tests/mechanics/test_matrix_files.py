@@ -214,7 +214,7 @@ def test_what_is_no_path_is_refused(mass):
 
 
 @pytest.mark.parametrize("ending", [*ENDINGS, ".mat", ".rsa", ".sti"])
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_any_change_of_bytes_is_read_or_refused_in_one_line(tmp_path, ending, data):
     file, mass = write(tmp_path / f"k{ending}", STIFFNESS), write(tmp_path / "m.npz", MASS)

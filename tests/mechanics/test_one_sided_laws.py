@@ -9,7 +9,7 @@ from true_law import force_of_links
 
 import multiphi_exudyn as mp
 
-TIMES = np.linspace(0, 12, 121)
+TIMES = np.linspace(0, 6, 61)
 ROW = np.array([0.0, -0.5, 1.0])
 AT = {"m2": 1.0, "m1": -0.5}
 
@@ -97,7 +97,7 @@ class TestEveryTable:
     def test_the_motion_is_that_of_the_law_and_keeps_its_ledger(self, name):
         table, own = tables()[name], structure()
         velocity = np.array([0.0, -1.5, 2.0])
-        run = mp.simulate(mp.MultiPhiModel(own, [mp.ForceLaw(AT, table)], modes="all"), 12.0, velocity=velocity)
+        run = mp.simulate(mp.MultiPhiModel(own, [mp.ForceLaw(AT, table)], modes="all"), 6.0, velocity=velocity)
         expected = followed(own, table, velocity)
         assert run.status == "ok"
         assert np.ptp(ROW @ expected) > 0.5
@@ -129,7 +129,6 @@ class TestEveryTable:
 @pytest.mark.parametrize(("function", "span"), [
     (lambda q: 100 * q, (0.0, 1.0)),
     (lambda q: 100 * q, (-1.0, 0.0)),
-    (lambda q: q + 2 * q**3, (0.0, 1.5)),
     (lambda q: q + 2 * q**3, (0.5, 1.5)),
     (lambda q: -1 / (3 - q) ** 2, (-1.0, -0.25)),
     (lambda q: 3 - q, (0.0, 1.0)),
@@ -137,7 +136,7 @@ class TestEveryTable:
 def test_a_function_followed_on_one_side_goes_on_in_a_line_on_the_other(function, span):
     law = mp.ForceLaw(AT, function, span=span, segments=12)
     own, velocity = structure(), np.array([0.0, -1.5, 2.0])
-    run = mp.simulate(mp.MultiPhiModel(own, [law], modes="all"), 12.0, velocity=velocity)
+    run = mp.simulate(mp.MultiPhiModel(own, [law], modes="all"), 6.0, velocity=velocity)
     expected = followed(own, (law.knots, law.forces), velocity)
     assert run.status == "ok"
     assert np.max(np.abs(run.displacement(TIMES) - expected)) < 1e-9 * np.max(np.abs(expected))

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import scipy.sparse
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
@@ -277,6 +277,7 @@ class TestProperties:
             matrices[which] = scipy.sparse.csr_array(matrices[which])
         refused(ValueError, f"{which}: got a value that is NaN", LinearStructure, **matrices)
 
+    @settings(max_examples=40)
     @given(st.one_of(st.none(), st.text(), st.booleans(), st.complex_numbers(), st.lists(st.text()), st.binary()))
     def test_nothing_else_is_taken_for_a_matrix(self, thing):
         with pytest.raises(MultiPhiError):

@@ -79,7 +79,7 @@ def test_a_mode_that_rings_for_thousands_of_periods_is_not_waited_for():
     assert state.multiplier == pytest.approx(math.exp(-decay / 0.2), abs=1e-7)
 
 
-@pytest.mark.parametrize(("hz", "size"), [(0.35, 0.0), (0.42, 1.2), (0.42, 0.0), (0.7, 0.0)])
+@pytest.mark.parametrize(("hz", "size"), [(0.42, 1.2), (0.42, 0.0), (0.7, 0.0)])
 def test_a_bilinear_oscillator_settles_where_an_integrator_does(hz, size):
     model, load = bilinear(), mp.HarmonicLoad("m0", 1.0, hz)
     state = mp.steady_state(model, load, displacement=np.array([size]), tolerance=1e-9)

@@ -23,7 +23,7 @@ SHIPPED = {kind: sorted((Path(module.__file__).parent / "shipped").glob("*.toml"
 HARD = st.sampled_from(
     [math.nan, math.inf, -math.inf, 0, -1, 10**18, -1e300, 5e-324, "", "é\u202e\0", "paper-rig", [], {}, [[]], True]
 )
-EXISTING = settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+EXISTING = settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def load(kind, file):

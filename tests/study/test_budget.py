@@ -18,6 +18,8 @@ from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
 
+pytestmark = pytest.mark.usefixtures("few_elements")
+
 STEPS, GEOMETRY, CONTACT, TRUNCATION, BODY = CAUSES
 FULL = [
     {"kind": "full", "name": "fine", "elements": 4, "step": 1e-4},

@@ -67,8 +67,10 @@ class TestFrequencies:
 
 
 class TestFullBeam:
-    @pytest.mark.parametrize(("kind", "elements", "ceiling"), [("ancf", 20, 7e-4), ("geometrically-exact", 114, 8e-4)])
-    @pytest.mark.parametrize("clamp", ELASTIC)
+    @pytest.mark.parametrize(
+        ("clamp", "kind", "elements", "ceiling"),
+        [*((clamp, "ancf", 20, 7e-4) for clamp in ELASTIC), (ELASTIC[-1], "geometrically-exact", 114, 8e-4)],
+    )
     def test_linearised_has_the_planar_beams_frequencies(self, clamp, kind, elements, ceiling):
         full = FullBeam(rig_beam(clamp=clamp), (), FullBeamSettings(kind=kind, elements=elements))
         assert_allclose(frequencies(full.structure), of_rig(clamp), rtol=ceiling)

@@ -64,6 +64,7 @@ def test_a_contact_that_is_never_reached_costs_no_level(tmp_path):
     assert (needs.levels_built, needs.levels_possible) == (1, 2)
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_the_command_prints_a_line_for_every_scene(tmp_path, capsys):
     assert cli.main(["needs", write(tmp_path / "small.toml", BEAM)]) == 0
     heads, line = capsys.readouterr().out.splitlines()

@@ -25,6 +25,8 @@ from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
 
+pytestmark = pytest.mark.usefixtures("few_elements")
+
 FULL = {"kind": "full", "elements": 3, "step": 1e-4}
 MODELS = [
     {"kind": "reduced", "name": "compliant-r{modes}"},

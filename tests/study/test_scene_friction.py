@@ -19,6 +19,8 @@ from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
 
+pytestmark = pytest.mark.usefixtures("few_elements")
+
 RING = {"name": "ring", "direction": "middle", "limit": 0.8, "stiffness": 2e4}
 MODELS = [
     {"kind": "full", "name": "beam", "elements": 8, "step": 1e-4},

@@ -16,6 +16,8 @@ from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare, start_configuration
 
+pytestmark = pytest.mark.usefixtures("few_elements")
+
 SPAN = {"span": [-0.015, 0.015], "tolerance": 0.003}
 CUBIC = {"kind": "cubic", "name": "spring", "at": "tip", "k1": 50.0, "k3": 2e6} | SPAN
 LAWS = {

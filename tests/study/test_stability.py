@@ -23,6 +23,8 @@ from multiphi_exudyn.study.stability.summary import contents, failures, summarie
 from multiphi_exudyn.time.segments.segment import SegmentList
 from reference_models.full_matrices import run_matrices
 
+pytestmark = pytest.mark.usefixtures("few_elements")
+
 BUDGET = 20_000
 SLOW = {"many-events", "1000-seconds", "elements-1000"}  # seconds each; the command runs them
 BY_NAME = {case.name: case for case in CATALOGUE}

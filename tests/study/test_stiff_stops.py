@@ -12,6 +12,8 @@ from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
 
+pytestmark = pytest.mark.usefixtures("few_elements")
+
 RIGID = {"kind": "reduced", "name": "rigid", "contact": "rigid", "modes": "all"}
 
 

@@ -35,13 +35,13 @@ class TestAgainstAnIntegratorAt1e12:
     def structure(self, damping):
         return chain(3, damping=damping, stiffness=10.0)
 
-    def check(self, damping, loads, force, tolerance, **given):
-        structure = self.structure(damping)
-        run = mp.simulate(mp.MultiPhiModel(structure, [], modes="all"), 20.0, loads=loads)
-        expected, _ = integrated(structure, TIMES, lambda t: PLACE * force(t), **given)
+    def check(self, damping, loads, force, tolerance, t_end=10.0, **given):
+        structure, times = self.structure(damping), TIMES[t_end >= TIMES]
+        run = mp.simulate(mp.MultiPhiModel(structure, [], modes="all"), t_end, loads=loads)
+        expected, _ = integrated(structure, times, lambda t: PLACE * force(t), **given)
         assert run.status == "ok"
         assert not run.message
-        assert relative(run.displacement(TIMES), expected) < tolerance
+        assert relative(run.displacement(times), expected) < tolerance
         assert closes(run)
         return run
 
@@ -60,18 +60,18 @@ class TestAgainstAnIntegratorAt1e12:
         self.check(damping, loads, lambda t: 2 * math.cos(0.6 * math.pi * t) + math.cos(math.pi * t + 1) + 1.5, 1e-10)
 
     def test_sampled(self, damping):
-        times, forces = np.linspace(0.0, 15.0, 61), np.random.default_rng(0).normal(size=61)
+        times, forces = np.linspace(0.0, 7.5, 31), np.random.default_rng(0).normal(size=31)
         load = mp.SampledLoad("m1", times, forces)
         self.check(damping, [load], lambda t: np.interp(t, times, forces, right=0.0), 1e-10, breaks=times, longest=0.25)
 
-    @pytest.mark.parametrize("law", ["linear", "logarithmic"])
-    def test_sweep(self, damping, law):
+    def test_sweep(self, damping):
+        law = "linear" if damping is None else "logarithmic"
         load = mp.SweepLoad("m1", 1.0, 0.1, 2.0, 20.0, law, tolerance=1e-9)
         self.check(damping, [load], lambda t: math.cos(load.course.phase(np.array([t]))[0]), 1e-9)
 
     def test_smooth_function(self, damping):
         load = mp.FunctionLoad("m1", lambda t: np.exp(-t) * np.sin(7 * t), tolerance=1e-9)
-        self.check(damping, [load], lambda t: math.exp(-t) * math.sin(7 * t), 1e-9)
+        self.check(damping, [load], lambda t: math.exp(-t) * math.sin(7 * t), 1e-9, t_end=20.0)
 
 
 class TestContactsUnderLoads:

@@ -203,7 +203,7 @@ class TestLedger:
     """Closes to round-off, whatever moves and however many modes are kept."""
 
     @pytest.mark.parametrize("modes", ["all", 3])
-    @pytest.mark.parametrize("seed", range(5))
+    @pytest.mark.parametrize("seed", range(4))  # each with a damping of its own
     def test_of_random_chains_with_everything(self, seed, modes):
         n, mass, springs, dampings, random = random_structure(seed)
         damping = list(dampings.values())[seed % 4]

@@ -68,7 +68,7 @@ class TestRandomModels:
     @pytest.mark.parametrize("kind", KINDS)
     def test_agree(self, damping, kind):
         compared = 0
-        for seed in range(13):
+        for seed in range(9):
             case = 1000 * KINDS.index(kind) + 100 * DAMPINGS.index(damping) + seed
             model, random = random_model(
                 case, damping=damping, rigid_body=seed % 8 == 0, truncated=seed % 3 > 0, kind=kind
@@ -79,12 +79,12 @@ class TestRandomModels:
             if not stopped(expected):
                 compared += 1
                 assert_same(expected, found, 1e-8)
-        assert compared > 8
+        assert compared > 5
 
 
 class TestRig:
     @pytest.mark.parametrize("stiffness", [1e6, math.inf])
-    @pytest.mark.parametrize("modes", [*range(1, 13), "all"])
+    @pytest.mark.parametrize("modes", [1, 3, 6, 12, "all"])
     def test_agrees(self, stiffness, modes):
         model, start = rig(stiffness, modes, elements=57 if modes != "all" else 8)
         expected, found = both(model, 0.2, displacement=start)

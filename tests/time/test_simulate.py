@@ -255,7 +255,7 @@ def scenes(draw):
     return model, rng.standard_normal(n) * draw(st.sampled_from([0.1, 1.0, 5.0]))
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(scenes())
 def test_whatever_the_scene_energy_falls_the_ledger_closes_and_nothing_penetrates(scene):
     model, velocity = scene

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from small_structures import chain, stop
@@ -33,6 +33,7 @@ numbers = st.lists(st.sampled_from([0.0, 1.0, -2.0, 1e-15, 3e-9, 0.1, 1e4]), min
 
 
 @pytest.mark.parametrize("compiled", [None, False], ids=["compiled", "plain"])
+@settings(max_examples=50)
 @given(x=numbers, modes=st.sets(st.integers(0, N - 1)), scale=st.sampled_from([1.0, 1e-200, 1e150]))
 def test_coordinates_without_their_round_off(compiled, x, modes, scale):
     """Whatever is round-off of its terms is zero, and nothing else, however large the start is."""
@@ -56,6 +57,7 @@ def test_numbers_that_overflow_are_not_far(compiled):
 
 
 @pytest.mark.parametrize("stiffness", [math.inf, 500.0], ids=["rigid", "compliant"])
+@settings(max_examples=50)
 @given(
     distance=st.sampled_from([0.0, 1e-16, 1e-13, 1e-11, 1e-10, 1e-9, 3e-9, 1e-8, 1e-4, 0.1, 1.0]),
     speed=st.sampled_from([None, 0.0, 1e-3, 1.0, 1e6]),

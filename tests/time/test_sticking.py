@@ -90,7 +90,7 @@ def simulated(mass, stiffness, load, rows, limits, displacement, velocity, t_end
 
 
 @pytest.mark.parametrize("redundant", [False, True])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 1, 2])  # of three freedoms and one, of two without springs
 def test_random_ones_move_as_an_integrator_says(seed, redundant):
     """Also without springs, where all come to rest at one instant; redundant: more of them than unknowns."""
     random = np.random.default_rng(100 + seed)
@@ -274,9 +274,11 @@ def test_equal_static_limits_fall_in_their_order_whatever_round_off_says(statics
     assert found.pop()[:2] == ("ok", "f0 slip+")
 
 
-@pytest.mark.parametrize("scale", [0.9, 1.0, 1.07])
 @pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
-@pytest.mark.parametrize(("mass", "coupling", "limit"), [(1.0, 0.3, 8.0), (1.0, -0.3, 2.0), (1.3, 0.3, 0.5)])
+@pytest.mark.parametrize(
+    ("mass", "coupling", "limit", "scale"),
+    [(1.0, 0.3, 8.0, 0.9), (1.0, 0.3, 8.0, 1.0), (1.0, -0.3, 2.0, 1.0), (1.3, 0.3, 0.5, 1.07)],
+)
 def test_who_has_a_static_limit_takes_over_from_one_that_is_at_its_limit_to_round_off(
     mass, coupling, limit, order, scale
 ):

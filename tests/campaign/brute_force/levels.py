@@ -12,6 +12,7 @@ from brute_force.sliding import SIGNS, TIMED, Sliding
 STEP = 0.35  # times the fastest rate of any level: a step
 NODES, WEIGHTS = ((np.polynomial.legendre.leggauss(8)[0] + 1) / 2, np.polynomial.legendre.leggauss(8)[1] / 2)
 TERMS = 16  # of the exponential's series inside a step
+LEFT = (1 - NODES) ** np.arange(TERMS + 1)[:, None] * WEIGHTS  # of a step of 1: what is left of it to every power
 
 
 @dataclass(frozen=True)
@@ -264,16 +265,16 @@ class Levels:
         vectors = [y, level.matrix @ y + level.inputs[:, 0]]
         for i in range(2, TERMS + 1):
             vectors.append(level.matrix @ vectors[-1] / i)
-        series, powers, responses = np.array(vectors).T, np.arange(TERMS + 1), level.responses
+        series, responses = np.array(vectors).T, level.responses
 
         def at(tau):
             taus = np.atleast_1d(tau)
-            moved = series @ taus ** powers[:, None]
+            powers = np.vander(taus, TERMS + 2, increasing=True).T
+            moved = series @ powers[:-1]
             if responses.size:
                 times = taus[:, None] * NODES
                 given = self.inputs((t + times).ravel())[:, 1:].reshape(*times.shape, -1)
-                left = (taus[:, None] - times) ** powers[:, None, None] * (taus[:, None] * WEIGHTS)
-                moments = np.einsum("ikq,kqw->iwk", left, given)
+                moments = np.einsum("iq,kqw->iwk", LEFT, given) * powers[1:, None]
                 moved = moved + responses @ moments.reshape(-1, len(taus))
             return moved if np.ndim(tau) else moved[:, 0]
 
