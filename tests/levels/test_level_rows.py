@@ -13,7 +13,8 @@ from multiphi_exudyn.events.transitions import defect_forms, exits
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.level import level_rows, static_response
 from multiphi_exudyn.levels.level.build_level import build_level
-from multiphi_exudyn.mathematics.eigenproblems import modes, orthonormal
+from multiphi_exudyn.mathematics import orthonormal
+from multiphi_exudyn.mathematics.eigenproblems import modes
 from multiphi_exudyn.mathematics.response import free_response
 
 DAMPINGS = [mp.RayleighDamping(0.5, 1e-5), mp.ModalDamping(0.01)]
