@@ -307,6 +307,7 @@ class TestFailures:
 
 def test_nothing_is_written_or_printed(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(exu.config, "printToConsole", True)  # other tests may have switched it off
     run(0.01)
     run(0.01, newton_tolerance=1e-15)
     assert list(tmp_path.iterdir()) == []
