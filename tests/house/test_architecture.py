@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
+from posix_modules import POSIX
 
 ROOT = Path(__file__).parents[2]
 BESIDE = ("reference_models", "exudyn_plugin")  # a package beside the house, and the room after which it stands
@@ -35,7 +36,6 @@ HEAVY = {
     "h5py": ("multiphi_exudyn/mechanics/files/array_files.py",),
     "pyyeti": ("multiphi_exudyn/mechanics/files/array_files.py",),
 }
-POSIX = ("fcntl", "grp", "posix_ipc", "pty", "pwd", "resource", "syslog", "termios", "tty")
 GUARDED = {"multiphi_exudyn/study/sweep/executors.py": {"fcntl"}}  # behind `if sys.platform == "linux"`
 WITH_NUMBA = (  # may be imported inside a function, as numba may
     "multiphi_exudyn.mathematics.compiling.compilation",

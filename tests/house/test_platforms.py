@@ -4,10 +4,9 @@ import subprocess
 import sys
 
 import numpy as np
+from posix_modules import POSIX
 
 from multiphi_exudyn import cli
-
-POSIX = ("fcntl", "grp", "posix_ipc", "pty", "pwd", "resource", "syslog", "termios", "tty")
 
 MAIN_PATH = f"""
 import os, signal, sys, sysconfig

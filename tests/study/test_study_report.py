@@ -364,7 +364,19 @@ def test_lasting_settings_have_a_table_of_their_own():
     assert told.count("times faster than the full model") == 2 * render_study(small_study()).count(
         "times faster than the full model"
     )
-    assert "where every finer setting has to hold it too" in told
+    assert "full model that does, also where every finer setting has to hold it too." in told
+
+
+def test_a_setting_that_does_not_last_is_named_beside_one_that_does():
+    rows = [row("m", error, setting={"modes": r}) for r, error in ((4, 0.009), (6, 0.03), (8, 0.008), (9, 0.02))]
+    timings = [timing("m", 1e-3 * r, setting={"modes": r}) for r in (4, 6, 8, 9)]
+    methods = [{"name": "m", "model": {"kind": "reduced"}, "refine": "modes"}]
+    told = findings(result_of(rows, timings, methods))["outcome"]
+    assert told[1:4] == (
+        "The cheapest within 5 % is m (r = 4): 4 ms, also where every finer setting has to hold it too.",
+        "The cheapest within 2 % is m (r = 4): 4 ms; where every finer setting has to hold it too, m (r = 8): 8 ms.",
+        "The cheapest within 1 % is m (r = 4): 4 ms; where every finer setting has to hold it too, none.",
+    )
 
 
 def test_budgets_without_methods_have_a_table(monkeypatch):

@@ -134,10 +134,14 @@ def _at_one_point(result: StudyResult) -> dict[str, Any]:
 
 
 def _cheapest(result: StudyResult, at: Mapping[str, Any], tolerance: float) -> dict[str, Any]:
-    """The cheapest setting, and how much faster it is where every finer setting has to hold the tolerance too."""
+    """The cheapest setting, and the cheapest one of which every finer setting holds the tolerance too.
+
+    lasting: None where no method has finer settings; lasts: whether both are the same.
+    """
     best, lasting = (records(cheapest(result, at, tolerance, kind))[0] for kind in (False, True))
     refined = any(method.refine for method in result.study.methods)
-    return {"tolerance": tolerance, "best": best, "lasting": lasting["faster"] if refined else None}
+    lasts = all(best[name] == lasting[name] for name in ("method", "setting", "faster"))
+    return {"tolerance": tolerance, "best": best, "lasting": lasting if refined else None, "lasts": lasts}
 
 
 def _uncertainties(result: StudyResult) -> dict[str, Any]:
