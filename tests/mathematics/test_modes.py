@@ -46,7 +46,6 @@ def free_beam(elements, *, scale=1.0):
 
 
 @functools.cache
-@functools.cache
 def free_beam_modes(elements, *, scale=1.0):
     """That beam and all its modes."""
     structure = free_beam(elements, scale=scale)

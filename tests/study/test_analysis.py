@@ -129,11 +129,12 @@ def test_near_the_cheapest_are_settings_whose_order_a_change_of_speed_could_turn
 def test_of_settings_timed_in_turns_too_these_times_count():
     result = timed(a=[(1.0, 0.01)], b=[(1.1, 0.01), (5.0, 0.001)])
     assert chosen(cheapest(result, {}, 0.01).head(1)) == {"a": 1}
-    turns = in_turns([("a", {"modes": 1}, [2.0, 1.2, 1.2, 2.0, 1.0]), ("b", {"modes": 1}, [1.1] * 3)])
+    several = [2.0, 1.2, 1.2, 2.0, 1.0, 1.2, 2.0, 2.0]
+    turns = in_turns([("a", {"modes": 1}, several), ("b", {"modes": 1}, [1.1] * 8)])
     turned = replace(result, turns=(turns,))
     found = settings(turned)
     assert list(found.online_s) == [1.2, 1.1, 5.0]
-    assert list(found.repeats_s) == [[2.0, 1.2, 1.2, 2.0, 1.0], [1.1] * 3, settings(result).repeats_s.iloc[2]]
+    assert list(found.repeats_s) == [several, [1.1] * 8, settings(result).repeats_s.iloc[2]]
     assert list(found.in_turns) == [True, True, False]
     assert chosen(cheapest(turned, {}, 0.01).head(1)) == {"b": 1}
     read = list(csv.DictReader(io.StringIO(csv_text(turned))))
@@ -142,8 +143,16 @@ def test_of_settings_timed_in_turns_too_these_times_count():
         ("1.1", "1.1"),
         ("5.0", ""),
     ]
-    failed = replace(in_turns([("a", {"modes": 1}, [9.0])]), status="failed", values={})
-    assert settings(replace(result, turns=(failed,))).equals(settings(result))
+    few = in_turns([("a", {"modes": 1}, [9.0] * 7)])
+    for none in (few, replace(few, status="failed", values={})):
+        assert settings(replace(result, turns=(none,))).equals(settings(result))
+
+
+def test_a_setting_that_is_given_twice_has_its_times_twice():
+    rows = [row("a", 0.01, setting=STEP), row("a", 0.01, setting=STEP), row("b", 0.01)]
+    timings = [timing("a", 2.0, setting=STEP), timing("a", 2.2, setting=STEP), timing("b", 3.0)]
+    turns = (in_turns([("a", STEP, [1.5] * 8), ("b", {}, [2.5] * 8)]),)
+    assert list(settings(result_of(rows, timings, turns=turns)).online_s) == [1.5, 1.5, 2.5]
 
 
 def test_how_many_times_faster_counts_from_the_fastest_full_model_of_the_same_tolerance():

@@ -199,7 +199,7 @@ class TestRunning:
         study = load_study(write(folder / "study.toml", STUDY))
         with Store(folder / "runs.sqlite") as opened, pytest.MonkeyPatch.context() as patch:
             patch.setattr(runner, "repeated", timing.repeated)
-            patch.setattr(timing, "ROUNDS", 5)
+            patch.setattr(timing, "ROUNDS", timing.FEWEST_ROUNDS)
             yield study, opened, run_study(study, opened, progress=False)
 
     def test_rows_fronts_times_and_uncertainty(self, finished):
@@ -215,7 +215,7 @@ class TestRunning:
             assert (levels.online_s > 0).all()
             assert (levels.repeats_s.map(len) >= 3).all()
             assert levels.in_turns.sum() >= 2
-            assert set(levels.repeats_s[levels.in_turns].map(len)) == {5}
+            assert set(levels.repeats_s[levels.in_turns].map(len)) == {timing.FEWEST_ROUNDS}
         assert [(row.status, row.message) for row in result.turns] == 2 * [("ok", "")]
         assert all(s.measures["indicator"] > 0 for s in found.itertuples() if s.method == "levels")
         stepwise = [row for row in result.rows if row.parameters["method"] == "stepwise"]

@@ -115,12 +115,17 @@ def test_a_busy_machine_and_unsteady_repeats_are_told():
 
 def test_what_was_timed_in_turns_is_told():
     rows, timings = [row("a", 0.1), row("b", 0.1)], [timing("a", 1.0), timing("b", 1.1)]
-    turns = (in_turns([("a", {}, [1.0] * 5), ("b", {}, [1.1] * 4 + [9.9])]),)
+    turns = (in_turns([("a", {}, [1.0] * 9), ("b", {}, [1.1] * 8 + [9.9])]),)
     found = findings(result_of(rows, timings, turns=turns))
     told = found["timing"][-1]
     assert "differ most" not in " ".join(found["distrust"])  # no quartile depends on the longest time
-    assert told.startswith("Of these, 2 settings that take at most 10 times as long as the cheapest within a tolerance")
-    assert "in 5 rounds" in told
+    assert told.startswith(
+        "Of these, 2 settings within a tolerance, in at most 10 times the time of the cheapest, were"
+    )
+    assert "in 9 rounds" in told
+    assert "2 machines" not in " ".join(found["distrust"])
+    elsewhere = (replace(turns[0], environment=turns[0].environment | {"host": "another"}),)
+    assert "2 machines" in " ".join(findings(result_of(rows, timings, turns=elsewhere))["distrust"])
     assert "turns" not in " ".join(findings(result_of(rows, timings))["timing"])
 
 
@@ -364,7 +369,7 @@ def test_lasting_settings_have_a_table_of_their_own():
     assert told.count("times faster than the full model") == 2 * render_study(small_study()).count(
         "times faster than the full model"
     )
-    assert "full model that does, also where every finer setting has to hold it too." in told
+    assert "full model that does. Every finer setting holds it too." in told
 
 
 def test_a_setting_that_does_not_last_is_named_beside_one_that_does():
@@ -373,7 +378,7 @@ def test_a_setting_that_does_not_last_is_named_beside_one_that_does():
     methods = [{"name": "m", "model": {"kind": "reduced"}, "refine": "modes"}]
     told = findings(result_of(rows, timings, methods))["outcome"]
     assert told[1:4] == (
-        "The cheapest within 5 % is m (r = 4): 4 ms, also where every finer setting has to hold it too.",
+        "The cheapest within 5 % is m (r = 4): 4 ms. Every finer setting holds it too.",
         "The cheapest within 2 % is m (r = 4): 4 ms; where every finer setting has to hold it too, m (r = 8): 8 ms.",
         "The cheapest within 1 % is m (r = 4): 4 ms; where every finer setting has to hold it too, none.",
     )

@@ -22,8 +22,7 @@ import numpy as np
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.level.sliding import SlidingLevel
-from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING
-from multiphi_exudyn.mathematics.round_off import PRODUCT, ZERO, drop_round_off
+from multiphi_exudyn.mathematics.round_off import FOLLOWING, PRODUCT, ZERO, drop_round_off
 
 __all__ = ["Channels"]
 

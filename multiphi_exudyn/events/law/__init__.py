@@ -69,9 +69,9 @@ the functions that implement it:
 12. Rigid friction elements that stick, reverse or begin to slip at an instant are decided together, those at contacts
    that are not rigid with their present mu N. Their forces are within their limits, static ones until they slip, and
    complementary to their accelerations. Of the elements that then fall from their static limits those that reverse
-   their slip fall first: others may bear less after it, and go on sticking. An element that needs just its limit, to
-   round-off, slips; one that needs just a larger static limit sticks, unless it requests slip. What depends on the next
-   derivative, or on truncation, each element decides alone.
+   their slip fall first: others may bear less after it, and go on sticking. Of several, an element that needs just its
+   limit, to round-off, slips; one that needs just a larger static limit sticks, unless it requests slip. What depends
+   on the next derivative, or on truncation, each element decides alone.
    Of redundant elements an independent set sticks; the one that bears most beyond its limit falls last, the last one of
    equal ones. The others exert their limit as if they slipped, or are idle at a contact that is not rigid. They take
    over when needed, also from an element that only round-off keeps within its limit. The motion is the same if not more

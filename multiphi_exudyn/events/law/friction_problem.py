@@ -50,9 +50,9 @@ from multiphi_exudyn.events.law.phases import first_exit, opening
 from multiphi_exudyn.events.states.signals import row_sign
 from multiphi_exudyn.events.states.state_arrays import accelerate, acceleration_sizes
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
-from multiphi_exudyn.mathematics.complementarity.least_distance import ALIKE
 from multiphi_exudyn.mathematics.complementarity.principal_pivoting import pose
 from multiphi_exudyn.mathematics.orthonormal import norm, scalar_product
+from multiphi_exudyn.mathematics.round_off import ALIKE
 
 __all__ = [
     "at_limit",

@@ -73,10 +73,10 @@ from multiphi_exudyn.events.law.switching import open_and_enter
 from multiphi_exudyn.events.states.signals import row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.complementarity.free_rows import ABOVE, BELOW, SIDES, WAITING
-from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING
 from multiphi_exudyn.mathematics.complementarity.principal_pivoting import SOLVED, solve
 from multiphi_exudyn.mathematics.complementarity.row_sides import free_balanced_rows
 from multiphi_exudyn.mathematics.orthonormal import scalar_product
+from multiphi_exudyn.mathematics.round_off import FOLLOWING
 
 __all__ = ["stick_together"]
 

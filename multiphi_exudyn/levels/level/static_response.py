@@ -19,9 +19,8 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.base.modal_base import GAPS, SPRINGS, SQUARES, ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
-from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING
 from multiphi_exudyn.mathematics.orthonormal import absolute_product, scalar_product
-from multiphi_exudyn.mathematics.round_off import INDEPENDENT, ZERO, drop_round_off
+from multiphi_exudyn.mathematics.round_off import FOLLOWING, INDEPENDENT, ZERO, drop_round_off
 
 __all__ = ["Asymptotic", "gaps_and_strain", "response_of_neutral_level", "static_response"]
 

@@ -15,12 +15,10 @@ from __future__ import annotations
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.mathematics.round_off import INDEPENDENT, ZERO
+from multiphi_exudyn.mathematics.round_off import ALIKE, FOLLOWING, INDEPENDENT, ZERO
 
-__all__ = ["FOLLOWING", "Infeasible", "least_distance"]
+__all__ = ["Infeasible", "least_distance"]
 
-FOLLOWING = 10 * INDEPENDENT  # of its terms: allowed violation of an inequality that depends on others
-ALIKE = 1e-10  # of the larger one: violations, ways or reserves, equal but for round-off; the first comes first
 SETS = 20  # tried for every inequality: far fewer are needed
 
 

@@ -80,7 +80,7 @@ from multiphi_exudyn.mathematics.complementarity.free_rows import (
     solve_free_rows,
     update_tied_shares,
 )
-from multiphi_exudyn.mathematics.complementarity.least_distance import FOLLOWING, SETS
+from multiphi_exudyn.mathematics.complementarity.least_distance import SETS
 from multiphi_exudyn.mathematics.complementarity.row_sides import (
     accept_dependent_row,
     choose_sides,
@@ -90,7 +90,7 @@ from multiphi_exudyn.mathematics.complementarity.row_sides import (
     update_violations,
 )
 from multiphi_exudyn.mathematics.orthonormal import norm, scalar_product
-from multiphi_exudyn.mathematics.round_off import INDEPENDENT, ZERO
+from multiphi_exudyn.mathematics.round_off import FOLLOWING, INDEPENDENT, ZERO
 
 __all__ = ["EXCLUDED", "PROBLEM", "SOLVED", "UNDECIDED", "lay_out", "pose", "problem_ints", "problem_numbers", "solve"]
 

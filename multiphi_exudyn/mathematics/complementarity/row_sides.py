@@ -45,9 +45,8 @@ from multiphi_exudyn.mathematics.complementarity.free_rows import (
     factor,
     project_out,
 )
-from multiphi_exudyn.mathematics.complementarity.least_distance import ALIKE, FOLLOWING
 from multiphi_exudyn.mathematics.orthonormal import norm, scalar_product
-from multiphi_exudyn.mathematics.round_off import INDEPENDENT, ZERO
+from multiphi_exudyn.mathematics.round_off import ALIKE, FOLLOWING, INDEPENDENT, ZERO
 
 __all__ = [
     "accept_dependent_row",

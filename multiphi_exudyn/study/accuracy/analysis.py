@@ -90,7 +90,7 @@ def cheapest(result: StudyResult, at: Mapping[str, Any], tolerance: float, lasti
 
 
 def near_cheapest(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
-    """Settings whose time is at most ``NEAR`` times that of the cheapest within one of the study's tolerances.
+    """Settings within one of the study's tolerances, in at most ``NEAR`` times the time of the cheapest within it.
 
     Of runs too long to be repeated (timing.py) none.
     """

@@ -6,7 +6,7 @@
 content is a hash of the scene with the study's changes, the reference, the method's model, the files of matrices, the
 time limit, and the versions of this package and of Exudyn: a stored run is reused only if all of these are the same.
 The method "reference" is the scene's reference at that point of the axes, "coarser" its copy; "in turns" has
-"cases": those that are timed in turns.
+"cases": the parameters of the runs that are timed in turns.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from multiphi_exudyn.study.scene.scenes import Scene, scene_data, scene_of
 from multiphi_exudyn.study.scene.toml_file import read_toml, validated
 from multiphi_exudyn.study.sweep.sweep import grid
 
-__all__ = ["BUDGET", "CASE", "Parameters", "Study", "load_study", "shipped_studies"]
+__all__ = ["BUDGET", "CASE", "TURNS", "Parameters", "Study", "load_study", "shipped_studies"]
 
 CASE = "case"  # name of the model that a case runs
 BUDGET = "budget"  # method of the error budgets' cases
@@ -183,8 +183,8 @@ def _check(study: Study) -> None:
 def _faults_of_methods(study: Study) -> Iterator[str]:
     names = [method.name for method in study.file.methods]
     for name in dict.fromkeys(names):
-        if names.count(name) > 1 or name in (REFERENCE, COARSER, BUDGET):
-            needed = "another name for each method, none of them reference, coarser or budget"
+        if names.count(name) > 1 or name in (REFERENCE, COARSER, BUDGET, TURNS):
+            needed = "another name for each method, none of them reference, coarser, budget or in turns"
             yield _fault("methods", name, needed)
     for name in study.file.maps:
         if name not in names:

@@ -1,4 +1,4 @@
-"""A study from beginning to end: references, error pass, error budgets, timing pass, turns, maps.
+"""A study from beginning to end: references, error pass, error budgets, timing pass, maps, turns.
 
 The error pass runs wherever the executor has workers. At the first point of the scene's axes every setting itself, not
 its nearby ones, is run once more, nudged, for its sensitivity horizon: one number per model is enough, and the other
@@ -22,7 +22,7 @@ from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.study.accuracy.analysis import most_accurate, near_cheapest
 from multiphi_exudyn.study.accuracy.budget import budget
-from multiphi_exudyn.study.accuracy.cases import CASE, Parameters, Study
+from multiphi_exudyn.study.accuracy.cases import CASE, TURNS, Parameters, Study
 from multiphi_exudyn.study.accuracy.study_result import MapPair, StudyResult, setting_key
 from multiphi_exudyn.study.measures.measures import measures
 from multiphi_exudyn.study.measures.spectra import FEWEST, FREQUENCIES, wavelet_map
@@ -41,7 +41,7 @@ from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
 __all__ = ["BudgetRun", "MeasuredRun", "TimedRun", "TimedTurns", "run_study"]
 
-ERRORS, TIMING, TURNS, BUDGETS = "error", "timing", "in turns", "budget"  # names of the passes in the store
+ERRORS, TIMING, BUDGETS = "error", "timing", "budget"  # names of the passes in the store, as TURNS
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,8 @@ def _turns(study: Study, result: StudyResult) -> Iterator[Parameters]:
     """At every point of the axes the case of settings to be timed in turns, where there are several."""
     for at in study.points:
         near = set(near_cheapest(result, at).index)
-        cases = [dict(row.parameters) for row in result.timings if setting_key(row.parameters) in near]
+        timed = {setting_key(row.parameters): dict(row.parameters) for row in result.timings}
+        cases = [case for key, case in timed.items() if key in near]
         if len(cases) > 1:
             yield study.turns(at, cases)
 

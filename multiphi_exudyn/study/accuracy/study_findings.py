@@ -180,7 +180,7 @@ def _times(result: StudyResult) -> dict[str, Any]:
         "unsteady": UNSTEADY,
         "loads": _loads(result),
         "busy": BUSY,
-        "hosts": len({row.environment.get("host") for row in result.timings}),
+        "hosts": len({row.environment.get("host") for row in (*result.timings, *result.turns)}),
         "rounds": timed.repeats_s[timed.in_turns].map(len).tolist(),
         "near": NEAR,
         "counts": [len(row.values["repeats_s"]) for row in result.timings if row.status == "ok"],

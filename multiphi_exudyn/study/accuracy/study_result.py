@@ -19,7 +19,7 @@ import pandas as pd
 
 from multiphi_exudyn.study.accuracy.study_file import REFERENCE, StudyFile
 from multiphi_exudyn.study.measures.spectra import Map
-from multiphi_exudyn.study.running.timing import undisturbed
+from multiphi_exudyn.study.running.timing import FEWEST_ROUNDS, undisturbed
 from multiphi_exudyn.study.sweep.row import Row, key_of
 
 __all__ = ["MapPair", "StudyResult", "all_numbers", "csv_text", "error_of", "setting_key", "worst_judged"]
@@ -99,13 +99,11 @@ class StudyResult:
         of_setting = self.runs.assign(error=self.runs.error.fillna(math.inf)).groupby("key")
         cause = of_setting.cause.agg(lambda causes: next(filter(None, causes), ""))
         timings = [(setting_key(row.parameters), row) for row in self.timings]
-        times = {key: dict(row.values) for key, row in timings if row.status == "ok"}
+        times = {key: {**row.values, **self._turns.get(key, {})} for key, row in timings if row.status == "ok"}
         untimed = {key: f"timing {row.status}: {row.message}" for key, row in timings if row.status != "ok"}
         table = own.rename(columns={"error": "own_error"}).assign(error=of_setting.error.max(), cause=cause)
         table = table.join(pd.DataFrame.from_dict(times, orient="index").reindex(columns=TIMES))
         table["in_turns"] = table.index.isin(list(self._turns))
-        for key, found in self._turns.items():
-            table.at[key, "online_s"], table.at[key, "repeats_s"] = found["online_s"], found["repeats_s"]
         table["message"] = table.cause.where(table.cause != "", [untimed.get(str(key), "") for key in table.index])
         table["lasting_error"] = self._lasting(table)
         return table.replace({"error": math.inf, "lasting_error": math.inf}, np.nan)
@@ -171,9 +169,10 @@ def setting_key(parameters: Mapping[str, Any]) -> str:
 
 
 def _of_cases(row: Row) -> Iterator[tuple[Mapping[str, Any], dict[str, Any]]]:
-    """Each case of a row of settings in turns, with its times [s]; none of a row that failed."""
+    """Each case of a row of settings in turns, with its times [s]; none of a row that failed, or of too few rounds."""
     for case, repeats in zip(row.parameters["cases"], row.values.get("repeats_s", ()), strict=False):
-        yield case, {"online_s": undisturbed(repeats), "repeats_s": repeats}
+        if len(repeats) >= FEWEST_ROUNDS:
+            yield case, {"online_s": undisturbed(repeats), "repeats_s": repeats}
 
 
 def _cause(result: StudyResult, row: Row) -> str:

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.mathematics.compiling.compiled import available, compile_entries
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.running.timing import repeated, timed
@@ -87,9 +88,14 @@ class Runner(ABC):
         return replace(run, status="failed", message=cause) if cause else complete
 
     def ready(self) -> Callable[[], float]:
-        """Prepare and solve once; every call solves again, and returns the time of the solver [s]."""
+        """Prepare and solve once; every call solves again, and returns the time of the solver [s].
+
+        Raises NumericalFailure where the answer has failed.
+        """
         prepared, _ = self._prepared()
-        self.solve(prepared)
+        outcome = self.outcome(prepared, self.solve(prepared)[0])
+        if outcome["status"] != "ok":
+            raise NumericalFailure(f"{self.label}: {outcome['message']}")
         return lambda: self.solve(prepared)[1]
 
     def _prepared(self) -> tuple[Any, float]:

@@ -15,7 +15,8 @@ T = TypeVar("T")
 REPEAT_BUDGET_S = 2.0  # s; a run that takes longer is timed once
 STEADY_S = 0.3  # s, over which short runs are repeated: a machine's speed varies
 ROUNDS = 200  # of runs in turns
-TURNS_BUDGET_S = 20.0  # s, of all turns of a study
+TURNS_BUDGET_S = 20.0  # s, of all rounds of a study but the first at every point
+FEWEST_ROUNDS = 8  # whose lower quartile says more than repeats in one stretch do
 UNDISTURBED = 0.25  # share of the shortest times: a machine may be slow for three quarters of the rounds
 
 

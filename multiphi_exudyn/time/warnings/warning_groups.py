@@ -57,7 +57,7 @@ def issue(sentences: Iterable[str], level: int = CALLER) -> None:
 
 @contextmanager
 def kept_back() -> Iterator[None]:
-    """Issue nothing inside, in this thread: for many runs the sentences are collected and issued in groups."""
+    """Keep back what ``issue`` would issue inside, in this thread: sentences of many runs are issued in groups."""
     token = _is_keeping_back.set(True)
     try:
         yield
