@@ -144,10 +144,9 @@ def run_study(study: Study, store: Store, executor: Executor | None = None, prog
 
 def _turns(study: Study, result: StudyResult) -> Iterator[Parameters]:
     """At every point of the axes the case of settings to be timed in turns, where there are several."""
+    timed = {setting_key(row.parameters): dict(row.parameters) for row in result.timings}
     for at in study.points:
-        near = set(near_cheapest(result, at).index)
-        timed = {setting_key(row.parameters): dict(row.parameters) for row in result.timings}
-        cases = [case for key, case in timed.items() if key in near]
+        cases = [timed[key] for key in near_cheapest(result, at).index.unique()]
         if len(cases) > 1:
             yield study.turns(at, cases)
 
