@@ -58,5 +58,6 @@ def test_a_contact_that_stays_closed_in_the_impact_of_another_takes_its_share():
     expected = structure.mass @ -speed  # both velocities become zero
     assert strike.impulse == pytest.approx(expected[1], rel=1e-12)
     assert dict(strike.shared) == pytest.approx({"held": expected[0]}, rel=1e-12)
+    assert len(run.events) == len(tuple(run.events))  # a share is no event of its own
     just = math.nextafter(strike.time, 0.0), math.nextafter(strike.time, 1.0)
     assert run.contact_impulse("held", *just) == pytest.approx(expected[0], rel=1e-9)
