@@ -29,7 +29,7 @@ from multiphi_exudyn.mechanics.structures.arguments import is_real
 from multiphi_exudyn.steady.settled_state import PeriodicLoad, SteadyState, course_of, frequency
 from multiphi_exudyn.steady.settling import CHUNK, Search, with_warnings
 from multiphi_exudyn.steady.shooting import PeriodMap
-from multiphi_exudyn.time.simulate import Run, base_warnings_of, holding, started
+from multiphi_exudyn.time.simulate import Run, base_warnings_of, check_start, holding
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from multiphi_exudyn.time.warnings.warning_groups import issue, kept_back
 
@@ -118,7 +118,8 @@ def settle_run(
     _check(model, load, other_loads, periods, tolerance)
     (displacement, velocity, start), loads, period = begin, (load, *other_loads), 1.0 / frequency(load)
     model = holding(model.decided or model, loads, start)
-    run = started(Run(model, CHUNK * period, displacement, velocity, loads, start=start, rewound=True))
+    run = Run(model, CHUNK * period, displacement, velocity, loads, start=start, rewound=True)
+    check_start(run)
     search = Search(PeriodMap(model, loads, period), load, tolerance, base_warnings_of(run, model))
     return search.settle(with_warnings(run.trajectory()), periods)
 

@@ -7,7 +7,7 @@ ends the trajectory early, with a status and its cause.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -37,11 +37,11 @@ __all__ = [
     "Run",
     "SharedResources",
     "base_warnings_of",
+    "check_start",
     "checked_end",
     "holding",
     "run_with_warnings",
     "simulate",
-    "started",
 ]
 
 
@@ -134,8 +134,7 @@ def checked_end(model: MultiPhiModel, t_end: float) -> float:
 def run_with_warnings(run: Run) -> Trajectory:
     """Trajectory of a run with its warnings, none of them issued."""
     modes = run.model.modes
-    if run.start is not None:
-        run = started(run)
+    check_start(run)
     trajectory = run.trajectory()
     sentences = warnings_of(trajectory, modes if isinstance(modes, Tolerance) else None)
     if not trajectory.model.base.complete:
@@ -150,7 +149,8 @@ def base_warnings_of(run: Run, model: MultiPhiModel, rows: Sequence[np.ndarray] 
     if model.base.complete:
         return ()
     acting = np.vstack([patterns(model.structure, run.loads), *rows])
-    return tuple(base_warnings(model, acting, displacement=run.displacement, velocity=run.velocity))
+    x = run.displacement if run.rest is None else run.rest.displacement
+    return tuple(base_warnings(model, acting, displacement=x, velocity=run.velocity))
 
 
 def holding(
@@ -195,7 +195,6 @@ class Run:
     loads: Sequence[Load] = ()
     compiled: bool | None = None
     start: Trajectory | Equilibrium | None = None
-    stretches: Mapping[str, float] | None = None
     rewound: bool = False
     shared: SharedResources | None = None
     ahead: Motion | None = None
@@ -225,9 +224,7 @@ class Run:
             raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
         before, levels = self._before, self.levels(finer)
         if before is None:
-            start = first_start(
-                levels, self.t_end, self.displacement, self.velocity, self.stretches or {}, self.compiled
-            )
+            start = first_start(levels, self.t_end, self.displacement, self.velocity, self.rest, self.compiled)
         else:
             start = continued_start(before, levels, self.rewound)
         return (motion_of if self.shared is None else self.shared.motion)(levels, start, self.compiled)
@@ -236,6 +233,11 @@ class Run:
     def _before(self) -> Trajectory | None:
         """Trajectory that this run continues, None for a new one."""
         return None if self.start is None or isinstance(self.start, Equilibrium) else self.start
+
+    @property
+    def rest(self) -> Equilibrium | None:
+        """Equilibrium in which this run starts, None for a run that starts from elsewhere."""
+        return self.start if isinstance(self.start, Equilibrium) else None
 
     def levels(self, finer: float = 1.0) -> LoadedLevels:
         """Levels under the loads, which the model keeps where the loads are immutable.
@@ -266,23 +268,17 @@ class Run:
         """Trajectory of the same run from y, y' (m,) in base coordinates."""
         if isinstance(self.start, Trajectory):
             return replace(self, start=with_final_velocity(self.start, v), ahead=None).trajectory()
-        shapes = self.model.base.modes.shapes
-        return replace(self, displacement=shapes @ y, velocity=shapes @ v, ahead=None).trajectory()
+        x, x_t = self.model.base.modes.shapes @ y, self.model.base.modes.shapes @ v
+        if self.rest is not None:
+            return replace(self, start=Equilibrium(x, self.rest.stretches), velocity=x_t, ahead=None).trajectory()
+        return replace(self, displacement=x, velocity=x_t, ahead=None).trajectory()
 
 
-def started(run: Run) -> Run:
-    """Run with a checked start, where an equilibrium is replaced by its displacement and stretches."""
+def check_start(run: Run) -> None:
+    """Refuse a trajectory from whose end a run cannot go on, and an equilibrium of another model."""
     start = run.start
-    if start is not None:
-        _check_start(run)
-    if isinstance(start, Equilibrium):
-        return replace(run, displacement=start.displacement, stretches=start.stretches, start=None)
-    return run
-
-
-def _check_start(run: Run) -> None:
-    """Refuse a trajectory from whose end this run cannot go on, and an equilibrium of another model."""
-    start = run.start
+    if start is None:
+        return
     if not isinstance(start, (Trajectory, Equilibrium)):
         raise MultiPhiTypeError(f"start: got {type(start).__name__}, need a Trajectory or an Equilibrium")
     if run.displacement is not None or run.velocity is not None:

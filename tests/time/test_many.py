@@ -56,7 +56,7 @@ def check(found, runs, points):
 def begun(given, displacements):
     """The levels of runs from some displacements, and their starts."""
     levels = Run(given, END).levels()
-    return levels, [first_start(levels, END, x, None, {}) for x in displacements]
+    return levels, [first_start(levels, END, x, None) for x in displacements]
 
 
 def carried(arrays, starts, is_summing_works=True):

@@ -42,10 +42,10 @@ def test_coordinates_without_their_round_off(compiled, x, modes, scale):
     x = np.array(x)
     x -= base.modes.shapes[:, sorted(modes)] @ (onto[sorted(modes)] @ x)  # modes that have round-off alone
     x *= scale
-    y, v, _ = setting_out(base).coordinates(x, -x, compiled)
+    y, v, _ = setting_out(base).coordinates(x, -x, None, compiled)
     assert_array_equal(y, drop_round_off(onto @ x, sizes @ np.abs(x)))
     assert_array_equal(v, -y)
-    y, v, far = setting_out(base).coordinates(None, None, compiled)
+    y, v, far = setting_out(base).coordinates(None, None, None, compiled)
     assert far
     assert not np.concatenate([y, v]).any()
 
@@ -53,7 +53,7 @@ def test_coordinates_without_their_round_off(compiled, x, modes, scale):
 @pytest.mark.parametrize("compiled", [None, False], ids=["compiled", "plain"])
 def test_numbers_that_overflow_are_not_far(compiled):
     with np.errstate(over="ignore"):
-        assert not setting_out(model().base).coordinates(np.full(N, 1e200), None, compiled)[2]
+        assert not setting_out(model().base).coordinates(np.full(N, 1e200), None, None, compiled)[2]
 
 
 @pytest.mark.parametrize("stiffness", [math.inf, 500.0], ids=["rigid", "compliant"])
@@ -69,10 +69,10 @@ def test_what_is_seen_at_once_is_what_every_contact_is_asked(stiffness, distance
     x = np.array(others) * 1e-2
     x[2], x[5] = min(x[2], 0.39), distance - 0.3
     x_t = None if speed is None else speed * np.arange(1.0, N + 1)
-    short = first_start(levels, END, x, x_t, {})
+    short = first_start(levels, END, x, x_t)
     scales = levels.starts.get_or_build(END, lambda: None)
     object.__setattr__(scales, "apart", None)
-    long = first_start(levels, END, x, x_t, {})
+    long = first_start(levels, END, x, x_t)
     assert (short.states, short.touching, short.penetrating) == (long.states, long.touching, long.penetrating)
     for name in ("displacement", "velocity", "gaps", "held"):
         assert_array_equal(getattr(short, name), getattr(long, name))
@@ -84,5 +84,5 @@ def test_a_start_is_far_by_how_far_it_is_and_where_its_speed_takes_it():
     y, v = base.coordinates(x), base.coordinates(x_t)
     gaps = 1.0 + y @ (base.directions / np.linalg.norm(base.directions, axis=0))
     limit = gaps.min() / (np.linalg.norm(y) + np.linalg.norm(v))
-    assert setting_out(base, 0.999 * limit).coordinates(x, x_t, None)[2]
-    assert not setting_out(base, 1.001 * limit).coordinates(x, x_t, None)[2]
+    assert setting_out(base, 0.999 * limit).coordinates(x, x_t, None, None)[2]
+    assert not setting_out(base, 1.001 * limit).coordinates(x, x_t, None, None)[2]

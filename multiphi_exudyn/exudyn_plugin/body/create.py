@@ -27,7 +27,7 @@ from multiphi_exudyn.mechanics.loads.loads import Load
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.structures.arguments import is_real
 from multiphi_exudyn.time.run.motion import Motion
-from multiphi_exudyn.time.simulate import Run, base_warnings_of, holding, started
+from multiphi_exudyn.time.simulate import Run, base_warnings_of, check_start, holding
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["CreateMultiPhiBody"]
@@ -154,7 +154,8 @@ def CreateMultiPhiBody(
     nodes = interface_nodes(model.structure, interface)
     rows = [node.rows for node in nodes]
     model = holding(model, loads, start, rows)
-    run = started(Run(model, PROVISIONAL, displacement, velocity, loads, start=start, rewound=True))
+    run = Run(model, PROVISIONAL, displacement, velocity, loads, start=start, rewound=True)
+    check_start(run)
     body = MultiPhiBody(name, _motion(run), loads, PROVISIONAL, matchedStepSize, base_warnings_of(run, model, rows))
     moving_surfaces = [link for link in model.links if link.velocity]
     if nodes and moving_surfaces:

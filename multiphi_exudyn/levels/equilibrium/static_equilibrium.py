@@ -26,7 +26,8 @@ friction, Ing. Archiv 60 (1990); R. W. Cottle, J.-S. Pang, R. E. Stone, The Line
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -53,6 +54,8 @@ class Equilibrium:
         x [m, rad].
     stretches : mapping of str to float
         Of the springs of friction [m], by name, at a contact NAME.tangential; zero without a spring.
+    known : tuple, default None
+        A base and the displacement in its coordinates (m,), so that runs need not project it.
 
     Examples
     --------
@@ -70,6 +73,21 @@ class Equilibrium:
 
     displacement: np.ndarray
     stretches: Mapping[str, float]
+    known: tuple[ModalBase, np.ndarray] | None = field(default=None, repr=False, compare=False)
+
+    @classmethod
+    def of(cls, base: ModalBase, y: np.ndarray, stretches: Mapping[str, float]) -> Equilibrium:
+        """Equilibrium at y (m,) in base coordinates; its displacement is read-only, as what is known belongs to it."""
+        x = base.modes.shapes @ y
+        x.setflags(write=False)
+        return cls(x, stretches, (base, base.coordinates(x)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.displacement, self.stretches)  # a copy does without the base
+
+    def coordinates(self, base: ModalBase) -> np.ndarray | None:
+        """Displacement in coordinates (m,) of a base where it is known there, else None."""
+        return self.known[1] if self.known is not None and self.known[0] is base else None
 
 
 @dataclass

@@ -271,18 +271,21 @@ class MultiPhiModel(SharedBase, Shown):
         >>> print(1e3 * x)  # mm: three springs of 4e4 N/m in series
         [2.5 5.  7.5]
         """
-        return self.equilibrium(forces, inertia_relief).displacement
+        return np.asarray(self.base.modes.shapes @ self._equilibrium(forces, inertia_relief)[0])
 
     def equilibrium(self, forces: Mapping[str, float], inertia_relief: bool = False) -> Equilibrium:
         """Return ``static_equilibrium`` with the stretches of friction springs, as a start for ``simulate``.
 
         The arguments and errors are those of ``static_equilibrium``.
         """
+        y, stretches = self._equilibrium(forces, inertia_relief)
+        return Equilibrium.of(self.base, y, {self.links[k].name: float(stretches[k]) for k in self.held})
+
+    def _equilibrium(self, forces: Mapping[str, float], inertia_relief: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Return y (m,) and the stretches (l,) [m] of links in equilibrium under forces at points."""
         base, load = self.base, self._force_row(forces)
         size = np.abs(base.modes.shapes.T) @ np.abs(load)
-        y, stretches = equilibrium_under_forces(base, base.modes.shapes.T @ load, size, inertia_relief)
-        stretch_of = {self.links[k].name: float(stretches[k]) for k in self.held}
-        return Equilibrium(base.modes.shapes @ y, stretch_of)
+        return equilibrium_under_forces(base, base.modes.shapes.T @ load, size, inertia_relief)
 
     def base_load(self, forces: Mapping[str, float]) -> np.ndarray:
         """Return forces [N] at points as a load (m,) in base coordinates."""

@@ -101,7 +101,7 @@ class Task:
         waiting, starts, remaining = list[int](), list[Start](), list[int]()
         for number in numbers:
             try:
-                starts.append(first_start(levels, end, *self._starts[number], {}))
+                starts.append(first_start(levels, end, *self._starts[number]))
                 waiting.append(number)
             except MultiPhiError as error:
                 self.results[number] = "failed", str(error), ()

@@ -8,7 +8,6 @@ too, as it must not begin inside its stop. A compliant one that is inside by so 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +16,7 @@ from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.events.arrays import CLOSE, IDLE, OPEN, SLIP_FORWARD
 from multiphi_exudyn.events.packing.start_arrays import Start
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
+from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT, drop_round_off
 from multiphi_exudyn.mechanics.elements.element import friction_spring
@@ -77,27 +77,31 @@ def first_start(
     end: float,
     displacement: np.ndarray | None,
     velocity: np.ndarray | None,
-    stretches: Mapping[str, float],
+    rest: Equilibrium | None = None,
     compiled: bool | None = None,
 ) -> Start:
     """Start of a run to ``end`` [s] from x, x' (n,), None for zero, with the first states of the contacts.
 
-    stretches: of the springs of friction, by the names of their links. compiled: False for plain Python alone.
+    rest: equilibrium in whose place x is, with the springs of friction stretched. compiled: False for plain Python.
     """
     base, vector = levels.model.base, levels.model.structure.vector
     scales: _Scales = levels.starts.get_or_build(end, lambda: _Scales.of(levels, end))
+    known = None if rest is None else rest.coordinates(base)
+    if rest is not None and known is None:
+        displacement = rest.displacement
     x = None if displacement is None else vector("displacement", displacement)
     x_t = None if velocity is None else vector("velocity", velocity)
     if scales.projection is None:
         y, v = [np.zeros(len(scales.times)) if given is None else base.coordinates(given) for given in (x, x_t)]
+        y = y if known is None else known
     else:
-        y, v, far = scales.projection.coordinates(x, x_t, compiled)
+        y, v, far = scales.projection.coordinates(x, x_t, known, compiled)
         if far and scales.apart is not None:
             return Start(y, v, (), (), scales.stops, scales.apart, NO_PLACES)
     moving = v * scales.times
     length = math.sqrt(y.dot(y)) + math.sqrt(moving.dot(moving))
     gaps, near = y.dot(base.directions) + scales.stops, scales.near(np.abs(y) @ base.magnitudes[0], length)
-    return _in_touch(levels.model, scales, (y, v), (gaps.tolist(), near.tolist()), stretches)
+    return _in_touch(levels.model, scales, (y, v), (gaps.tolist(), near.tolist()), rest)
 
 
 def _in_touch(
@@ -105,10 +109,10 @@ def _in_touch(
     scales: _Scales,
     start: tuple[np.ndarray, np.ndarray],
     judged: tuple[list[float], list[float]],
-    stretches: Mapping[str, float],
+    rest: Equilibrium | None,
 ) -> Start:
     """Start y, y' in which some contacts may touch; judged: gaps (l,), and those below which they touch."""
-    (y, v), (gaps, near), base = start, judged, model.base
+    (y, v), (gaps, near), base, stretches = start, judged, model.base, {} if rest is None else rest.stretches
     terms = np.abs(v) @ base.magnitudes[0] + np.abs(scales.speeds)
     rates = drop_round_off(v @ base.directions - scales.speeds, terms)
     states = np.zeros(len(model.contacts), int)

@@ -61,14 +61,19 @@ class StartProjection:
         self._arguments = arrays, sizes.ravel(), n, len(links), near
 
     def coordinates(
-        self, x: np.ndarray | None, x_t: np.ndarray | None, compiled: bool | None
+        self, x: np.ndarray | None, x_t: np.ndarray | None, known: np.ndarray | None, compiled: bool | None
     ) -> tuple[np.ndarray, np.ndarray, bool]:
-        """Return y, y' (n,) of x, x' (n,), None for zero, and whether the bound shows that no gap is near zero."""
+        """Return y, y' (n,) of x, x' (n,), None for zero, and whether the bound shows that no gap is near zero.
+
+        known: y, where that is known and x is None.
+        """
         for given, place, result in ((x, self._x, self._y), (x_t, self._x_t, self._y_t)):
             if given is None:
                 place[:] = result[:] = 0.0
             else:
                 place[:] = given
                 self._onto.dot(place, out=result)
+        if known is not None:
+            self._y[:] = known
         far = (check_far.plain if compiled is False else check_far)(*self._arguments)
         return self._y.copy(), self._y_t.copy(), far == 1
