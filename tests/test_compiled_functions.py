@@ -484,6 +484,7 @@ print(*sorted(one.function.__name__ for one in compiled._entries))
         "clear",
         "closed_form",
         "copy_factors",
+        "gather",
         "integrate",
         "integrate_works",
         "is_far",

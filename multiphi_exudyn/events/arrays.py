@@ -45,7 +45,12 @@ of an element, and the states, exits and channels of its friction, are data alon
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+
+from multiphi_exudyn.mathematics.compiling.compiled import Entry
 
 __all__ = ["Buffers"]
 
@@ -78,12 +83,11 @@ CHANGES, CHANGE_IMPULSES, CHANGE_COUNT, CHANGE_ROOM = 25, 26, 27, 29  # of the p
 FIRST_CHANGE = 72  # of the decision: earlier ones are impacts at the start
 WINDOW, DECISIONS, RING = 28, 112, 30  # chatter: size of the window, decisions so far, offset of their ring
 STOP_AT_EVENT, STARTING = 31, 71  # of a run yet to begin: FRESH, from GIVEN, or GOING_ON, from CURRENT
-SEGMENT_INTS, INSTANTS, SEGMENT_COUNT, SEGMENT_ROOM = 32, 33, 34, 35  # record
-COORDINATE_NUMBERS, COORDINATE_COUNT = 36, 37
-PHASE_INTS, PHASE_COUNT = 39, 40
-EVENT_INTS, EVENT_NUMBERS, EVENT_COUNT, EVENT_ROOM = 42, 43, 44, 45
-IMPACT_INTS, IMPACT_NUMBERS, IMPACT_COUNT = 46, 47, 48
-LEFT_OUT, LEFT_OUT_COUNT = 38, 41  # segments of the record whose works are not summed
+SEGMENT_INTS, INSTANTS, SEGMENT_ROOM = 32, 33, 35  # record, in the order in which level_arrays.py lays it out
+COORDINATE_NUMBERS, PHASE_INTS = 36, 39
+EVENT_INTS, EVENT_NUMBERS, EVENT_ROOM = 42, 43, 45
+IMPACT_INTS, IMPACT_NUMBERS = 46, 47
+LEFT_OUT = 38  # segments of the record whose works are not summed
 
 # scratch memory: offsets
 FLOW_BASIS, FLOW_FREE, FLOW_COUNT = 50, 51, 52  # its basis; number of exponentials of the free response, and of all
@@ -131,7 +135,11 @@ WORKING, SUMMED = 225, 226  # whether works are summed as segments end; whether 
 STARTS, START_STATES, START = 228, 229, 230  # offsets of starts and of their states; the number of the run's start
 MAPPED_AGAIN, SPEEDS_CHANGED = 231, 232  # whether the present decision used several maps, and impacts
 ISOLATED = 233  # whether no load acts on the structure
-RUN_INTS = 261
+SEGMENT_COUNT, COORDINATE_COUNT, PHASE_COUNT, EVENT_COUNT, LEFT_OUT_COUNT, IMPACT_COUNT = range(261, 267)  # record
+COPY = 267  # what is where when the record is copied (time/record/loop_copies.py)
+RUN_INTS = 284
+
+RECORD_COUNTS, COUNTED = SEGMENT_COUNT, 6  # the first count of the record, and how many there are
 
 # ---------------------------------------------------------------------- run record, numbers
 
@@ -157,6 +165,7 @@ WORKS_NOW = 66  # of the present segment
 SEEN = 69  # like LOOKED, with the present segment; for samples of a finished run (time/record/sampling.py)
 RUN_NUMBERS = 72
 OF_A_RUN = INDEPENDENCE  # number of first entries that belong to a run: it copies them when another run uses the arrays
+COPIED = OF_A_RUN + 1  # the same with its evaluations
 BY_IMPACT, KINETIC, STRAIN, STOP_WORK, DAMPING, FRICTION, LOSSES = 0, 1, 2, 3, 4, 5, 6
 
 # ---------------------------------------------------------------------- other records, ints
@@ -221,11 +230,19 @@ class Buffers:
     def __init__(self) -> None:
         self.ints, self.numbers, self.waves = np.zeros(1024, np.int64), np.zeros(4096), np.zeros(4096, complex)
         self._used = {"ints": 0, "numbers": 0, "waves": 0}
+        self._bound: dict[Entry, Callable[..., Any]] = {}
 
     @property
     def all(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """ints, numbers, waves."""
         return self.ints, self.numbers, self.waves
+
+    def bound(self, function: Entry) -> Callable[..., Any]:
+        """Return a compiled function with the three buffers as its first arguments, until one of them grows."""
+        bound = self._bound.get(function)
+        if bound is None:
+            bound = self._bound[function] = function.bound(*self.all)
+        return bound
 
     @property
     def size(self) -> int:
@@ -241,6 +258,7 @@ class Buffers:
             longer = np.zeros(max(2 * len(buffer), start + count), buffer.dtype)
             longer[:start] = buffer[:start]
             setattr(self, name, longer)
+            self._bound.clear()
         return start
 
     def put(self, name: str, values: object) -> int:

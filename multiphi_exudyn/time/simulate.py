@@ -163,7 +163,8 @@ def holding(
 
     rows: (k, n) of further places at which forces act.
     """
-    if start is not None and isinstance(start, Trajectory):
+    at_rest = start is None or isinstance(start, Equilibrium)  # asked first: it takes a tenth of the next question
+    if not at_rest and isinstance(start, Trajectory):
         return start.model if model.widened_to(start.model) else model
     if model.base.complete:
         return model
@@ -279,7 +280,7 @@ def check_start(run: Run) -> None:
     start = run.start
     if start is None:
         return
-    if not isinstance(start, (Trajectory, Equilibrium)):
+    if not isinstance(start, (Equilibrium, Trajectory)):
         raise MultiPhiTypeError(f"start: got {type(start).__name__}, need a Trajectory or an Equilibrium")
     if run.displacement is not None or run.velocity is not None:
         raise MultiPhiValueError("start: got a displacement or velocity as well, need one of them")

@@ -2,12 +2,11 @@
 
 import pytest
 
-from multiphi_exudyn.time.loop.loop import advance
-from multiphi_exudyn.time.run import motion
+from multiphi_exudyn.time.run.motion import carry
 
 
 @pytest.fixture(params=["compiled", "plain"])
 def both_ways(request, monkeypatch):
     """Every run of the test in one of the two."""
     if request.param == "plain":
-        monkeypatch.setattr(motion, "carry", advance)
+        monkeypatch.setattr(carry, "_native", carry.plain)

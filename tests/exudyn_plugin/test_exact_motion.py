@@ -8,13 +8,12 @@ from small_structures import chain
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.events.packing import level_arrays
-from multiphi_exudyn.exudyn_plugin.coupling import exact_motion
 from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedInertia, PointInertia
 from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import ExactMotion
 from multiphi_exudyn.exudyn_plugin.coupling.interface import _direct_reactions
 from multiphi_exudyn.exudyn_plugin.coupling.modal_force import LevelForces
 from multiphi_exudyn.time.loop import chatter
-from multiphi_exudyn.time.loop.loop import advance
+from multiphi_exudyn.time.run.motion import carry
 from multiphi_exudyn.time.simulate import Run
 
 T_END = 6.0
@@ -188,11 +187,11 @@ def test_a_failure_says_whose_it_is_and_when():
 
 def test_plain_functions_do_the_same(monkeypatch):
     structure, contacts, force, at = CASES["rigid"]
-    model = mp.MultiPhiModel(structure, contacts, modes="all")
     found = []
     for plain in (False, True):
+        model = mp.MultiPhiModel(structure, contacts, modes="all")
         if plain:
-            monkeypatch.setattr(exact_motion, "carry", advance)
+            monkeypatch.setattr(carry, "_native", carry.plain)
         motion = Run(model, 2.0, None, np.full(structure.n, -1.0)).begun()
         exact = ExactMotion(motion, motion.levels, "body", 0.0)
         exact.set_forces(held(model, structure.row(at), force), None)

@@ -15,7 +15,7 @@ from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 from multiphi_exudyn.exudyn_plugin.body.ahead.run_ahead import RunAhead
 from multiphi_exudyn.exudyn_plugin.body.ahead.undisturbed_steps import UndisturbedSteps
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.time.loop.loop import advance
+from multiphi_exudyn.time.run.motion import carry
 from reference_models.solver_settings import fixed_steps
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")
@@ -127,7 +127,7 @@ def test_a_function_of_the_user_changes_the_way_and_not_the_answer(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_without_the_compiled_loop_it_is_the_same(kind, monkeypatch):
-    monkeypatch.setattr("multiphi_exudyn.time.run.motion.carry", advance)
+    monkeypatch.setattr(carry, "_native", carry.plain)
     model = model_of(KINDS[kind])
     native, found = mp.simulate(model, T_END, velocity=VELOCITY), System(model, matchedStepSize=STEP).solve()
     assert same_events(found.events, native.events)

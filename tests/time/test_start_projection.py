@@ -1,6 +1,8 @@
 """Starts in coordinates of the base, and which of them are seen at once to touch nothing."""
 
+import copy
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -76,6 +78,39 @@ def test_what_is_seen_at_once_is_what_every_contact_is_asked(stiffness, distance
     assert (short.states, short.touching, short.penetrating) == (long.states, long.touching, long.penetrating)
     for name in ("displacement", "velocity", "gaps", "held"):
         assert_array_equal(getattr(short, name), getattr(long, name))
+
+
+def test_a_copied_model_looks_at_its_own_starts():
+    """The start of a run before the copy was far from its stop; those of the copy touch it, or are inside."""
+    given, x = model(), np.zeros(N)
+    mp.simulate(given, END, displacement=x)
+    copied = pickle.loads(pickle.dumps(given))
+    x[5] = -0.3
+    runs = [mp.simulate(each, END, displacement=x) for each in (given, copied)]
+    assert [run.start.touching for run in runs] == [(0,), (0,)]
+    x[5] = -0.31
+    with pytest.raises(mp.MultiPhiValueError, match="inside the rigid contact"):
+        mp.simulate(copied, END, displacement=x)
+
+
+@pytest.mark.parametrize("stiffness", [math.inf, 500.0], ids=["rigid", "compliant"])
+@pytest.mark.parametrize("force", [0.5, -40.0], ids=["far", "on its stop"])
+def test_a_run_from_an_equilibrium_is_one_from_its_displacement_without_a_projection(stiffness, force, monkeypatch):
+    given = model(stiffness)
+    rest = given.equilibrium({"m5": force})
+    expected = mp.simulate(given, END, displacement=rest.displacement)
+    base, other = given.base, model(stiffness)
+    assert rest.coordinates(other.base) is None
+    runs = [mp.simulate(each, END, start=start) for each in (given, other) for start in (rest, copy.deepcopy(rest))]
+    monkeypatch.setattr(type(base), "coordinates", None)
+    base.projection[0][:] = np.nan
+    runs.append(mp.simulate(given, END, start=rest))
+    for run in runs:
+        assert_array_equal(run.start.displacement, expected.start.displacement)
+        assert_array_equal(run.events.table(), expected.events.table())
+        assert run.start.states == expected.start.states
+    with pytest.raises(ValueError, match="read-only"):
+        rest.displacement[0] = 1.0  # it would not be that of its coordinates
 
 
 def test_a_start_is_far_by_how_far_it_is_and_where_its_speed_takes_it():

@@ -129,6 +129,7 @@ class LevelArrays:
         self._tables = LevelTables(self.buffers)  # of all levels and maps that the loop finds
         self.channels.describe(self.buffers)
         self.scratch = ScratchArrays(self.buffers, self.channels.terms)
+        self.ints[a.INSTANTS] = self.buffers.take("numbers", a.COPIED)  # of a run that fails before its first level
 
     @property
     def ints(self) -> np.ndarray:
@@ -183,16 +184,15 @@ class LevelArrays:
                     a.IMPACT_NUMBERS: a.IMPACT_WIDTH * events,
                 },
             }
+            beside = {"ints": room + exits, "numbers": a.COPIED + 2 * n}  # levels visited, and the state, of a copy
             for name, sizes in sizes_by_buffer.items():
-                place = self.buffers.take(name, sum(sizes.values()))  # in one step: a buffer that grows is copied
+                place = self.buffers.take(name, sum(sizes.values()) + beside[name])  # at once: it may copy the buffer
                 for slot, count in sizes.items():
                     self.ints[slot] = place
                     place += count
             self.ints[a.SEGMENT_ROOM], self.ints[a.EVENT_ROOM] = room, events
             self._evict_others()
-        ints = self.buffers.ints
-        ints[a.SEGMENT_COUNT] = ints[a.COORDINATE_COUNT] = ints[a.PHASE_COUNT] = ints[a.EVENT_COUNT] = 0
-        ints[a.LEFT_OUT_COUNT] = ints[a.IMPACT_COUNT] = 0
+        self.buffers.ints[a.RECORD_COUNTS : a.RECORD_COUNTS + a.COUNTED] = 0
 
     def level(self, states: Sequence[int]) -> int:
         """Return the record of the level of elements in these states, packing it if needed."""

@@ -74,7 +74,8 @@ class LoadedLevels:
         self._pushed = BoundedCache[tuple[int, ...], LoadedLevel](model.most_levels)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "arrays": None, "held": None}
+        starts = BoundedCache[float, Any](STARTS_KEPT)
+        return {**vars(self), "arrays": None, "held": None, "starts": starts}  # buffers: a copy makes its own
 
     @classmethod
     def static(cls, model: MultiPhiModel, load: np.ndarray, lasting: float = math.inf) -> LoadedLevels:

@@ -121,7 +121,7 @@ class ExactMotion:
         """Run the loop until it ends, and supply the levels it needs; whether an event occurred or was refused."""
         arrays, changed = self._arrays, False
         while True:
-            status = int(carry(*arrays.buffers.all, until))
+            status = int(arrays.buffers.bound(carry)(until))
             if status == a.NEED:
                 arrays.supply()
                 if not arrays.outgrown:

@@ -16,15 +16,16 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.arrays import NEED, OF_A_RUN
+from multiphi_exudyn.events.arrays import COUNTED, NEED, OF_A_RUN
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.packing.level_arrays import LevelArrays
 from multiphi_exudyn.events.packing.start_arrays import Start, set_starts
+from multiphi_exudyn.events.transitions.exits import exits_of
 from multiphi_exudyn.mathematics.compiling.compiled import entry
 from multiphi_exudyn.time.loop.motion_size import INDICATOR, SAMPLES
 from multiphi_exudyn.time.loop.verdict import set_verdict
-from multiphi_exudyn.time.many.batch_loop import ENDS, RUN_WIDTH, advance_starts, measure_starts, sample_starts
-from multiphi_exudyn.time.record.loop_copies import EMPTY, PARTS, copy_record
+from multiphi_exudyn.time.many.batch_loop import RUN_WIDTH, advance_starts, measure_starts, sample_starts
+from multiphi_exudyn.time.record.loop_copies import EMPTY, LoopState, RecordPart, copy_loop
 from multiphi_exudyn.time.run.motion import Motion
 
 __all__ = ["Batch"]
@@ -37,7 +38,7 @@ compute_verdict = entry(set_verdict)
 class Batch:
     """Runs from ``starts`` on ``arrays``, of which the first ``count`` have reached the ``end`` [s].
 
-    call: calls a compiled function with its arguments. parts: the record of the runs. ends, run_numbers: see
+    call: calls a compiled function with its arguments. levels, parts: of the record of the runs. ends, run_numbers: see
     ``advance_starts``.
     """
 
@@ -46,6 +47,7 @@ class Batch:
     end: float
     call: Callable[..., Any]
     count: int
+    levels: Sequence[LoadedLevel]
     parts: dict[str, np.ndarray]
     ends: np.ndarray
     run_numbers: np.ndarray
@@ -57,7 +59,7 @@ class Batch:
         motion.take_over()
         set_starts(arrays, starts)
         initial = arrays.numbers[:OF_A_RUN].copy()
-        ends, run_numbers = np.zeros((count + 1, ENDS), np.int64), np.empty((count, RUN_WIDTH))
+        ends, run_numbers = np.zeros((count + 1, COUNTED), np.int64), np.empty((count, RUN_WIDTH))
         arguments = end, arrays.channels.first_end, initial, count, ends.ravel(), run_numbers.ravel()
         count_done = int(call(advance_batch, *arrays.buffers.all, *arguments))
         arrays.owner = None
@@ -65,7 +67,8 @@ class Batch:
             potentials = [excitation.static.dot(start.displacement) for start in starts[:count_done]]
             run_numbers[:count_done, a.GIVEN_POTENTIAL] = potentials
             run_numbers[:count_done, a.VERDICT] = math.nan
-        return cls(arrays, starts, end, call, count_done, EMPTY | copy_record(arrays, PARTS), ends, run_numbers)
+        part, _ = copy_loop(arrays)
+        return cls(arrays, starts, end, call, count_done, part.levels, EMPTY | part.arrays(), ends, run_numbers)
 
     @property
     def events(self) -> np.ndarray:
@@ -79,15 +82,14 @@ class Batch:
         numbers: list[int] = self.parts["rows"][:, 0].tolist()
         return numbers
 
-    @functools.cached_property
-    def _visited(self) -> list[int]:
-        """The numbers of all levels visited."""
-        return sorted(set(self._numbers))
+    def _visited(self, k: int) -> list[int]:
+        """Numbers of the levels of a run, each level once."""
+        first, last = self._firsts[k], self._firsts[k + 1] - 1  # the last one is the final state
+        return list(dict.fromkeys(self._numbers[first:last]))
 
     def visited(self, k: int) -> tuple[tuple[int, ...], ...]:
         """States of the levels of a run, each level once."""
-        first, last = self._firsts[k], self._firsts[k + 1] - 1
-        return tuple([self.arrays.loaded[n].states for n in dict.fromkeys(self._numbers[first:last])])
+        return tuple([self.levels[number].states for number in self._visited(k)])
 
     @functools.cached_property
     def _firsts(self) -> list[int]:
@@ -98,9 +100,7 @@ class Batch:
     @functools.cached_property
     def _record(self) -> tuple[np.ndarray, ...]:
         """Arrays of the record for compiled functions, with the places of its levels (levels,)."""
-        offsets = np.zeros(self._visited[-1] + 1, np.int64)
-        for number in self._visited:
-            offsets[number] = self.arrays.level(self.arrays.loaded[number].states)
+        offsets = np.array([self.arrays.level(level.states) for level in self.levels], np.int64)
         parts = self.parts
         return parts["rows"].ravel(), parts["coordinates"], offsets, parts["instants"], self.ends.ravel()
 
@@ -113,10 +113,9 @@ class Batch:
         """Displacements (count, points, t) [m] at times (t,) [s]; rows: of all points in a level (level_rows.py)."""
         displacements = np.empty((self.count, points, len(times)))
         if displacements.size:
-            loaded = [(number, self.arrays.loaded[number]) for number in self._visited]
-            levels, width = self._visited[-1] + 1, max(level.level.modes for _, level in loaded)
+            levels, width = len(self.levels), max(level.level.modes for level in self.levels)
             functions = np.zeros((points, levels, 2 * width + 1))
-            for number, level in loaded:
+            for number, level in enumerate(self.levels):
                 n = level.level.modes
                 for p, row in enumerate(rows(level)):
                     functions[p, number, :n], functions[p, number, -1] = row[:n], row[-1]
@@ -163,13 +162,34 @@ class Batch:
     def motion(self, k: int) -> Motion:
         """The k-th run as a motion that has reached the end."""
         (s, _, _, e, left, i), (s_end, _, _, e_end, left_end, i_end) = self.ends[k : k + 2].tolist()
-        part = {name: given for name, given in self.parts.items() if name in ("coordinates", "phases")}
-        part |= {"rows": self.parts["rows"][s:s_end].copy(), "instants": self.parts["instants"][s:s_end]}
-        part |= {name: self.parts[name][e:e_end] for name in ("kinds", "amounts") if e_end > e}
-        if i_end > i:
-            part |= {"struck": self.parts["struck"][i:i_end] - e, "impacts": self.parts["impacts"][i:i_end]}
-        if left_end > left:
-            part["left_out"] = self.parts["left_out"][left:left_end] - s
+        parts, rows, visited = self.parts, self.parts["rows"][s:s_end].copy(), self._visited(k)
+        number, piece, start, waits = rows[-1].tolist()
+        level = self.levels[number]
+        n, exits = level.level.modes, len(exits_of(level))
+        phases = parts["phases"][waits : waits + exits].tolist() if waits >= 0 else [a.ARMED] * exits
+        x = parts["coordinates"][start : start + 2 * n]
+        run_numbers, (evaluations, transitions) = (
+            self.run_numbers[k, :OF_A_RUN],
+            self.run_numbers[k, OF_A_RUN:].tolist(),
+        )
+        state = LoopState(run_numbers, level, x[:n], x[n:], tuple(phases), piece, evaluations, int(transitions))
+        numbers = np.zeros(len(self.levels), int)
+        numbers[visited] = range(len(visited))
+        rows[:, 0] = numbers[rows[:, 0]]
+        arrays = {
+            "rows": rows[:-1],
+            "phases": parts["phases"],
+            "left_out": parts["left_out"][left:left_end] - s,
+            "kinds": parts["kinds"][e:e_end],
+            "struck": parts["struck"][i:i_end] - e,
+            "instants": parts["instants"][s:s_end],
+            "coordinates": parts["coordinates"],
+            "amounts": parts["amounts"][e:e_end],
+            "impacts": parts["impacts"][i:i_end],
+        }
+        events = int(np.count_nonzero(arrays["kinds"][:, 1] != a.SHARED))
+        levels = [self.levels[number] for number in visited]
+        part = RecordPart(levels, s_end - s - 1, left_end - left, events, lambda: arrays)
         motion = Motion(self.arrays, self.starts[k])
-        motion.set_result(part, self.run_numbers[k])
+        motion.take_result(part, state)
         return motion

@@ -7,23 +7,20 @@ the call.
 from __future__ import annotations
 
 from multiphi_exudyn.events.arrays import (
-    COORDINATE_COUNT,
+    COUNTED,
     DECISIONS,
     DRIVE_NEXT,
     END_REACHED,
-    EVENT_COUNT,
     FOUND,
     FRESH,
     GIVEN_UP,
     HORIZON,
-    IMPACT_COUNT,
-    LEFT_OUT_COUNT,
     NEED,
     OF_A_RUN,
     OK,
-    PHASE_COUNT,
     PIECE,
     PRESCRIBED,
+    RECORD_COUNTS,
     SEEN,
     SEGMENT_COUNT,
     SEGMENT_ROOM,
@@ -40,9 +37,8 @@ from multiphi_exudyn.time.loop.loop import advance
 from multiphi_exudyn.time.loop.loop_record import keep_segment
 from multiphi_exudyn.time.record.sampling import sample_rows, sample_sizes
 
-__all__ = ["ENDS", "RUN_WIDTH", "advance_starts", "measure_starts", "sample_starts"]
+__all__ = ["RUN_WIDTH", "advance_starts", "measure_starts", "sample_starts"]
 
-ENDS = 6  # ints: segments, coordinates, phases, events, segments left out and impacts up to the end of a run
 RUN_WIDTH = OF_A_RUN + 2
 
 
@@ -61,7 +57,7 @@ def advance_starts(
     """Advance the packed starts to ``end`` [s] one after the other; return how many of them have reached it.
 
     first_piece_end: end [s] of the first piece of the channels. initial: the numbers of a run at its start. ends:
-    counts (count + 1, ENDS) of the record, the first ones zero. run_numbers: numbers (count, RUN_WIDTH) of each
+    counts (count + 1, COUNTED) of the record, the first ones zero. run_numbers: numbers (count, RUN_WIDTH) of each
     run, with its function evaluations and transitions. A segment of zero length after those of a run has its final
     state.
     """
@@ -77,10 +73,8 @@ def advance_starts(
             keep_drive(ints, waves)
         status = advance(ints, numbers, waves, end)
         if status != END_REACHED or ints[SEGMENT_COUNT] >= ints[SEGMENT_ROOM]:
-            before = ENDS * k
-            ints[SEGMENT_COUNT], ints[COORDINATE_COUNT] = ends[before], ends[before + 1]
-            ints[PHASE_COUNT], ints[EVENT_COUNT] = ends[before + 2], ends[before + 3]
-            ints[LEFT_OUT_COUNT], ints[IMPACT_COUNT] = ends[before + 4], ends[before + 5]
+            for i in range(COUNTED):
+                ints[RECORD_COUNTS + i] = ends[COUNTED * k + i]
             return k
         for i in range(OF_A_RUN):
             run_numbers[k * RUN_WIDTH + i] = numbers[i]
@@ -88,9 +82,8 @@ def advance_starts(
         run_numbers[k * RUN_WIDTH + OF_A_RUN + 1] = ints[TRANSITIONS]
         ints[SUMMED] = 1  # no work in zero time
         keep_segment(ints, numbers, 0.0, numbers[HORIZON])
-        after = ENDS * (k + 1)
-        ends[after], ends[after + 1], ends[after + 2] = ints[SEGMENT_COUNT], ints[COORDINATE_COUNT], ints[PHASE_COUNT]
-        ends[after + 3], ends[after + 4], ends[after + 5] = ints[EVENT_COUNT], ints[LEFT_OUT_COUNT], ints[IMPACT_COUNT]
+        for i in range(COUNTED):
+            ends[COUNTED * (k + 1) + i] = ints[RECORD_COUNTS + i]
     return count
 
 
@@ -120,9 +113,10 @@ def sample_starts(
     for k in range(runs):
         for p in range(points):
             place, function = (k * points + p) * count, p * levels * (2 * width + 1)
+            first, last = ends[COUNTED * k], ends[COUNTED * (k + 1)] - 1
             status = sample_rows(
-                ints, numbers, waves, rows, coordinates, offsets, instants, ends[ENDS * k], ends[ENDS * (k + 1)] - 1,
-                functions, function, width, times, count, 0, values, place,
+                ints, numbers, waves, rows, coordinates, offsets, instants, first, last, functions, function, width,
+                times, count, 0, values, place,
             )  # fmt: skip
             if status == NEED:
                 return NEED
@@ -146,7 +140,7 @@ def measure_starts(
 ) -> int:
     """Put mean |y|^2 and largest energy (runs, 2) of the ``chosen`` runs into ``sizes``; return OK or NEED."""
     for i in range(runs):
-        first, last = ends[ENDS * chosen[i]], ends[ENDS * (chosen[i] + 1)] - 1
+        first, last = ends[COUNTED * chosen[i]], ends[COUNTED * (chosen[i] + 1)] - 1
         status = sample_sizes(ints, numbers, waves, rows, coordinates, offsets, instants, first, last, end)
         if status == NEED:
             return NEED

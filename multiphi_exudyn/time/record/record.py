@@ -17,7 +17,7 @@ from multiphi_exudyn.events.transitions.state import Phase
 from multiphi_exudyn.mathematics.compiling.compiled import entry
 from multiphi_exudyn.mechanics.elements.element import Element, ElementState
 from multiphi_exudyn.time.record.growing_array import GrowingArray
-from multiphi_exudyn.time.record.loop_copies import EMPTY, EVENTS, PARTS, copy_record
+from multiphi_exudyn.time.record.loop_copies import EMPTY, RecordPart, copy_loop
 from multiphi_exudyn.time.record.sampling import sample_rows, sample_sizes, sample_states
 from multiphi_exudyn.time.record.work import integrate_works, work_waves
 from multiphi_exudyn.time.segments.segment import Segment, owners
@@ -61,7 +61,8 @@ class Record:
         self.levels: list[LoadedLevel] = []
         self._numbers: dict[tuple[int, ...], int] = {}  # of the levels, by the states of their elements
         self._parts: dict[str, GrowingArray] = {}
-        self._last: dict[str, np.ndarray] = {}  # copied from the loop last, not yet added to the parts
+        self._unread: tuple[RecordPart, list[int]] | None = None  # last part, and numbers of its levels in this record
+        self._last: dict[str, np.ndarray] = {}  # its arrays once they are read, not yet added to the parts
 
     rows, instants, coordinates = _joined("rows"), _joined("instants"), _joined("coordinates")
     phases, left_out = _joined("phases"), _joined("left_out")
@@ -69,42 +70,52 @@ class Record:
 
     def collect(self) -> None:
         """Move the loop's segments and events from its arrays to this record."""
-        self.append(copy_record(self.arrays, PARTS))
+        self.append(copy_loop(self.arrays)[0])
 
     def collect_events(self) -> None:
-        """Move the loop's events from its arrays to this record, and drop its segments."""
-        self.append(copy_record(self.arrays, EVENTS))
+        """Copy the loop's events to this record, none of its segments; the caller begins a new record in the arrays."""
+        if self.arrays.ints[a.EVENT_COUNT]:
+            self.append(copy_loop(self.arrays)[0].without_segments())
 
-    def append(self, part: dict[str, np.ndarray]) -> None:
-        """Append a part, numbered as in the loop's arrays."""
-        if not part:
+    def append(self, part: RecordPart) -> None:
+        """Append a part, whose levels may have other numbers in this record."""
+        if not (part.segments or part.events):
             return
-        if self._last:
-            self._add(self._last)
-        self._last = part
-        if "rows" in part:
-            self._renumber(part["rows"][:, 0])
-            self.count += len(part["rows"])
-            self.left_out_count += len(part.get("left_out", ()))
-        if "kinds" in part:
-            self.event_count += int(np.count_nonzero(part["kinds"][:, 1] != a.SHARED))
-            vars(self).pop("event_rows", None)
+        if self.count or self.event_count:
+            self._add_last()
+        numbers = []
+        for level in part.levels:  # one may have been packed twice
+            number = self._numbers.setdefault(level.states, len(self.levels))
+            numbers.append(number)
+            if number == len(self.levels):
+                self.levels.append(level)
+        self._unread = part, numbers
+        self.count += part.segments
+        self.left_out_count += part.left_out
+        self.event_count += part.events
+        vars(self).pop("event_rows", None)
+
+    @property
+    def _latest(self) -> dict[str, np.ndarray]:
+        """Arrays of the last part that have rows, until they are added to the others."""
+        if self._unread is not None:
+            (part, numbers), self._unread = self._unread, None
+            self._last = part.arrays()
+            if numbers != list(range(len(numbers))):
+                rows = self._last["rows"]
+                rows[:, 0] = np.array(numbers)[rows[:, 0]]
+        return self._last
 
     @property
     def bytes(self) -> int:
         """Memory of the record."""
-        sizes = [part.nbytes for part in self._last.values()]
-        if self._parts:
-            sizes += [part.bytes for part in self._parts.values()]
-        return sum(sizes)
+        return sum(part.nbytes for part in self._latest.values()) + sum(part.bytes for part in self._parts.values())
 
     def whole(self, name: str) -> np.ndarray:
         """Return an array of the record as a whole."""
         if not self._parts:
-            return self._last.get(name, EMPTY[name])
-        if self._last:
-            part, self._last = self._last, {}
-            self._add(part)
+            return self._latest.get(name, EMPTY[name])
+        self._add_last()
         return self._parts[name].whole
 
     @property
@@ -112,8 +123,11 @@ class Record:
         """States of the elements of every visited level."""
         return tuple(self._numbers)
 
-    def _add(self, part: dict[str, np.ndarray]) -> None:
-        parts, rows = self._parts, part.get("rows", EMPTY["rows"])
+    def _add_last(self) -> None:
+        """Add the last part to those before it."""
+        if not (part := self._latest):
+            return
+        self._last, parts, rows = {}, self._parts, part.get("rows", EMPTY["rows"])
         if parts:
             rows[:, 2] += parts["coordinates"].count
             rows[rows[:, 3] >= 0, 3] += parts["phases"].count
@@ -127,18 +141,6 @@ class Record:
             self._parts = parts = {name: GrowingArray(empty) for name, empty in EMPTY.items()}
         for name, array in part.items():
             parts[name].add(array)
-
-    def _renumber(self, numbers: np.ndarray) -> None:
-        """Replace numbers (k,) of levels in the arrays, where a level may be packed twice, by those in this record."""
-        packed, renumbered, differs = numbers.tolist(), {}, False
-        for number in dict.fromkeys(packed):
-            level = self.arrays.loaded[number]
-            index = renumbered[number] = self._numbers.setdefault(level.states, len(self.levels))
-            if index == len(self.levels):
-                self.levels.append(level)
-            differs = differs or index != number
-        if differs:
-            numbers[:] = [renumbered[number] for number in packed]
 
     @functools.cached_property
     def event_rows(self) -> np.ndarray:

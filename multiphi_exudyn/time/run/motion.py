@@ -17,13 +17,13 @@ from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.packing.level_arrays import LevelArrays
 from multiphi_exudyn.events.packing.start_arrays import Measure, Start, set_starts, set_state
 from multiphi_exudyn.events.states.state_arrays import measure
-from multiphi_exudyn.events.transitions.exits import exits_of
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.transitions.state import Loss, State
 from multiphi_exudyn.mathematics.compiling.compiled import entry
 from multiphi_exudyn.time.loop.chatter import limits
 from multiphi_exudyn.time.loop.failures import failure
 from multiphi_exudyn.time.loop.loop import advance
+from multiphi_exudyn.time.record.loop_copies import LoopState, RecordPart, copy_loop
 from multiphi_exudyn.time.record.record import Record
 from multiphi_exudyn.time.record.recorded_segments import Events, Recorded
 from multiphi_exudyn.time.trajectory.final_state import FinalState
@@ -34,6 +34,7 @@ __all__ = ["Motion", "carry", "measured", "motion_of"]
 RECORD_BYTES = 2**31  # of a run: ten million segments of a small model; a laptop has memory for it and for a copy
 
 carry, measured = entry(advance), entry(measure)
+NO_RING = np.zeros(0)
 quiet = np.errstate(all="ignore")  # as in compiled code: numbers that are not finite are checked for
 
 
@@ -53,7 +54,7 @@ class Motion:
         loop: Callable[..., Any] | None = None,
     ) -> None:
         self.arrays, self.start = arrays, start
-        self._loop: Callable[..., Any] = loop or (carry.plain if compiled is False else carry)
+        self._loop = carry.plain if compiled is False else loop
         self._measured: Measure = measured.plain if compiled is False else measured
         self.levels = arrays.levels
         self.model = self.levels.model
@@ -154,7 +155,8 @@ class Motion:
     def _run(self, end: float) -> int:
         """Call the loop until it ends, and supply what it needs."""
         while True:
-            answer = int(self._loop(*self.arrays.buffers.all, end))
+            buffers = self.arrays.buffers
+            answer = int(buffers.bound(carry)(end) if self._loop is None else self._loop(*buffers.all, end))
             if answer == a.FULL:
                 self.record.collect()
                 self._check_record()
@@ -197,29 +199,6 @@ class Motion:
             self._write_arrays()
             self.arrays.owner = weakref.ref(self)
 
-    def _copied_state(self) -> FinalState:
-        """Copy of the state in the loop's arrays, which another run may take over."""
-        arrays, before = self.arrays, self._final
-        ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
-        state = before.level, before.displacement, before.velocity, before.phases
-        if not ints[a.STARTING]:
-            record, x, v, *_, waits, settled = ints[a.CURRENT : a.CURRENT + a.STATE_INTS].tolist()
-            level, exits = arrays.loaded[int(ints[record + a.NUMBER])], int(ints[record + a.EXIT_COUNT])
-            n = level.level.modes
-            phases = (a.ARMED,) * exits if settled else tuple(ints[waits : waits + exits].tolist())
-            state = level, numbers[x : x + n].copy(), numbers[v : v + n].copy(), phases
-        return FinalState(
-            numbers[: a.OF_A_RUN].copy(),
-            self.record,
-            *state,
-            *arrays.chatter,
-            int(ints[a.PIECE]),
-            float(numbers[ints[a.FOUND] + 1]),
-            int(ints[a.TRANSITIONS]),
-            self.model.levels_built,
-            arrays.buffers.size,
-        )
-
     def _write_arrays(self) -> None:
         """Write the present state, or the start, into the arrays."""
         arrays, ending = self.arrays, self._final
@@ -240,38 +219,25 @@ class Motion:
 
     def _read_arrays(self) -> None:
         """Read the loop's state and record from the arrays."""
-        self.record.collect()
-        self._final = self._copied_state()
-        self.time = float(self._final.numbers[a.TIME])
-        if not self.arrays.buffers.ints[a.STARTING]:
+        part, state = copy_loop(self.arrays)
+        if state.level is None:  # none yet
+            _, _, level, x, v, phases, *_ = self._final
+            state = state._replace(level=level, displacement=x, velocity=v, phases=phases)
+        else:
             self._starting = False
+        self._take(part, state, *self.arrays.chatter)
 
-    def set_result(self, part: dict[str, np.ndarray], run_numbers: np.ndarray) -> None:
-        """Take the result of batch.py: a record, of which the last segment is the final state.
+    def take_result(self, part: RecordPart, state: LoopState) -> None:
+        """Take the result of batch.py; the chatter check begins anew."""
+        self._starting = False
+        self._take(part, state, 0, NO_RING)
 
-        run_numbers: numbers of a run at its end, evaluations, transitions. The chatter check begins anew.
-        """
-        rows = part["rows"]
-        number, piece, start, waits = rows[-1].tolist()
-        level = self.arrays.loaded[number]
-        n, exits = level.level.modes, len(exits_of(level))
-        phases = part["phases"][waits : waits + exits].tolist() if waits >= 0 else [a.ARMED] * exits
-        x = part["coordinates"][start : start + 2 * n]
-        self.record.append(part | {"rows": rows[:-1]})
-        final = FinalState(
-            run_numbers[: a.OF_A_RUN],
-            self.record,
-            level,
-            x[:n],
-            x[n:],
-            tuple(phases),
-            piece=piece,
-            levels_built=self.model.levels_built,
-            array_bytes=self.arrays.buffers.size,
-        )
-        evaluations, transitions = run_numbers[a.OF_A_RUN :].tolist()
-        self._final = final._replace(evaluations=evaluations, transitions=int(transitions))
-        self._starting, self.time = False, float(run_numbers[a.TIME])
+    def _take(self, part: RecordPart, state: LoopState, decisions: int, ring: np.ndarray) -> None:
+        """Append to the record, and take the present state."""
+        self.record.append(part)
+        built, size = self.model.levels_built, self.arrays.buffers.size
+        self._final = FinalState(state.numbers, self.record, *state[1:], decisions, ring, built, size)
+        self.time = float(state.numbers[a.TIME])
 
     def failure(self) -> Exception:
         """Return the error that has stopped the loop."""

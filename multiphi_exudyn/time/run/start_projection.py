@@ -15,7 +15,7 @@ import numpy as np
 
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
-from multiphi_exudyn.mathematics.orthonormal import clear_products
+from multiphi_exudyn.mathematics.orthonormal import clear_products, norm, scalar_product
 
 __all__ = ["StartProjection"]
 
@@ -27,19 +27,15 @@ def is_far(arrays: Numbers, sizes: Numbers, n: int, links: int, near: float) -> 
     arrays: x, x', y, y', t and the row sums of ``sizes``, (n,) each, h / |h| and b / |h| of every link, (n + 1,); y and
     y' are cleared of round-off. sizes: |Phi|^T |M| (n, n). near: a.
     """
-    y, v, times, units, displacement_squares, velocity_squares = 2 * n, 3 * n, 4 * n, 6 * n, 0.0, 0.0
+    y, v, times, units, velocity_squares = 2 * n, 3 * n, 4 * n, 6 * n, 0.0
     clear_products(arrays, y, 0, sizes, 5 * n, n)
     clear_products(arrays, v, n, sizes, 5 * n, n)
     for i in range(n):
-        displacement_squares += arrays[y + i] * arrays[y + i]
         velocity_squares += (arrays[v + i] * arrays[times + i]) * (arrays[v + i] * arrays[times + i])
-    length = math.sqrt(displacement_squares) + math.sqrt(velocity_squares)
+    length = norm(arrays, y, n) + math.sqrt(velocity_squares)
     for k in range(links):
         row = units + k * (n + 1)
-        gap = -arrays[row + n]
-        for i in range(n):
-            gap += arrays[row + i] * arrays[y + i]
-        if not gap > near * length:
+        if not scalar_product(arrays, row, arrays, y, n) - arrays[row + n] > near * length:
             return 0
     return 1 if length < math.inf else 0
 
@@ -57,8 +53,9 @@ class StartProjection:
         n, (onto, sizes) = len(times), base.projection
         links = np.vstack([units, bounds]).T
         arrays = np.concatenate([np.zeros(4 * n), times, sizes.sum(axis=1), links.ravel()])
-        self._onto, (self._x, self._x_t, self._y, self._y_t) = onto, arrays[: 4 * n].reshape(4, n)
+        self._onto, self._vectors = onto, arrays[: 4 * n].reshape(4, n)
         self._arguments = arrays, sizes.ravel(), n, len(links), near
+        self._is_far = check_far.bound(*self._arguments[:2])
 
     def coordinates(
         self, x: np.ndarray | None, x_t: np.ndarray | None, known: np.ndarray | None, compiled: bool | None
@@ -67,13 +64,14 @@ class StartProjection:
 
         known: y, where that is known and x is None.
         """
-        for given, place, result in ((x, self._x, self._y), (x_t, self._x_t, self._y_t)):
-            if given is None:
-                place[:] = result[:] = 0.0
-            else:
-                place[:] = given
-                self._onto.dot(place, out=result)
+        vectors = self._vectors
+        vectors[:] = 0.0
+        for i, given in enumerate((x, x_t)):
+            if given is not None:
+                vectors[i] = given
+                self._onto.dot(vectors[i], out=vectors[2 + i])
         if known is not None:
-            self._y[:] = known
-        far = (check_far.plain if compiled is False else check_far)(*self._arguments)
-        return self._y.copy(), self._y_t.copy(), far == 1
+            vectors[2] = known
+        far = check_far.plain(*self._arguments) if compiled is False else self._is_far(*self._arguments[2:])
+        y, v = vectors[2:].copy()
+        return y, v, far == 1

@@ -24,7 +24,7 @@ class FinalState(NamedTuple):
 
     numbers: the run's own numbers, the first ones of the arrays. record: its segments and events. level: of the last
     state, None before the first one, with displacement xi, velocity xi' (n,) and the numbers of its exits' phases.
-    decisions, ring: of the chatter check. piece: of the channels. evaluations, transitions: counts so far.
+    piece: of the channels. evaluations, transitions: counts so far. decisions, ring: of the chatter check.
     levels_built, array_bytes: of the model, and of the arrays.
     """
 
@@ -34,11 +34,11 @@ class FinalState(NamedTuple):
     displacement: np.ndarray = NONE
     velocity: np.ndarray = NONE
     phases: tuple[int, ...] = ()
-    decisions: int = 0
-    ring: np.ndarray = NONE
     piece: int = 0
     evaluations: float = 0.0
     transitions: int = 0
+    decisions: int = 0
+    ring: np.ndarray = NONE
     levels_built: int = 0
     array_bytes: int = 0
 
