@@ -285,8 +285,8 @@ def check_start(run: Run) -> None:
     if run.displacement is not None or run.velocity is not None:
         raise MultiPhiValueError("start: got a displacement or velocity as well, need one of them")
     if isinstance(start, Equilibrium):
-        names = {run.model.links[k].name for k in run.model.held}
-        if set(start.stretches) != names:
+        held, links = run.model.held, run.model.links
+        if (start.stretches or held) and set(start.stretches) != (names := {links[k].name for k in held}):
             raise MultiPhiValueError(
                 f"start: got an equilibrium with the friction {', '.join(start.stretches) or 'none'}, need that of the "
                 f"model, {', '.join(sorted(names)) or 'none'}"

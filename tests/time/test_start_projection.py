@@ -44,10 +44,10 @@ def test_coordinates_without_their_round_off(compiled, x, modes, scale):
     x = np.array(x)
     x -= base.modes.shapes[:, sorted(modes)] @ (onto[sorted(modes)] @ x)  # modes that have round-off alone
     x *= scale
-    y, v, _ = setting_out(base).coordinates(x, -x, None, compiled)
+    y, v, _ = setting_out(base).coordinates(x, -x, compiled)
     assert_array_equal(y, drop_round_off(onto @ x, sizes @ np.abs(x)))
     assert_array_equal(v, -y)
-    y, v, far = setting_out(base).coordinates(None, None, None, compiled)
+    y, v, far = setting_out(base).coordinates(None, None, compiled)
     assert far
     assert not np.concatenate([y, v]).any()
 
@@ -55,7 +55,7 @@ def test_coordinates_without_their_round_off(compiled, x, modes, scale):
 @pytest.mark.parametrize("compiled", [None, False], ids=["compiled", "plain"])
 def test_numbers_that_overflow_are_not_far(compiled):
     with np.errstate(over="ignore"):
-        assert not setting_out(model().base).coordinates(np.full(N, 1e200), None, None, compiled)[2]
+        assert not setting_out(model().base).coordinates(np.full(N, 1e200), None, compiled)[2]
 
 
 @pytest.mark.parametrize("stiffness", [math.inf, 500.0], ids=["rigid", "compliant"])
@@ -119,5 +119,5 @@ def test_a_start_is_far_by_how_far_it_is_and_where_its_speed_takes_it():
     y, v = base.coordinates(x), base.coordinates(x_t)
     gaps = 1.0 + y @ (base.directions / np.linalg.norm(base.directions, axis=0))
     limit = gaps.min() / (np.linalg.norm(y) + np.linalg.norm(v))
-    assert setting_out(base, 0.999 * limit).coordinates(x, x_t, None, None)[2]
-    assert not setting_out(base, 1.001 * limit).coordinates(x, x_t, None, None)[2]
+    assert setting_out(base, 0.999 * limit).coordinates(x, x_t, None)[2]
+    assert not setting_out(base, 1.001 * limit).coordinates(x, x_t, None)[2]

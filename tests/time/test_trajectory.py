@@ -185,7 +185,7 @@ class TestContacts:
         expected = SegmentList(segments).integral(row, 1.3, 14.4) + total_impulse(tuple(run.events), contact, 1.3, 14.4)
         monkeypatch.setattr(Record, "segment", None)
         monkeypatch.setattr(Events, "_make", None)
-        again = dataclasses.replace(run, segments=Recorded(run.segments._record, math.nan, math.nan, (math.nan,) * 3))
+        again = dataclasses.replace(run, segments=Recorded(run.segments._record))
         assert_allclose(again.contact_impulse(contact, 1.3, 14.4), expected, rtol=1e-13)
 
     def test_impulses_balance_the_momentum_of_a_free_chain(self):

@@ -6,7 +6,6 @@ samples are wanted would spend as long on them as on ten of its events.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -196,15 +195,15 @@ def copy_loop(arrays: LevelArrays) -> tuple[RecordPart, LoopState]:
     """Copy the record, which is then empty in the arrays, and the state."""
     buffers, loaded = arrays.buffers, arrays.loaded
     buffers.bound(gathered)()
-    first, first_number, *head = buffers.ints[COPY : a.RUN_INTS].tolist()
-    counts = head[:COUNTED]
-    events, number, piece, transitions, visited, phases, of_run, ints_end, numbers_end = head[COUNTED:]
+    first, first_number, *counts, events, number, piece, transitions, visited, phases, of_run, ints_end, end = (
+        buffers.ints[COPY : a.RUN_INTS].tolist()
+    )
     ints = buffers.ints[first : first + ints_end].astype(np.int32)
-    numbers = buffers.numbers[first_number : first_number + numbers_end].copy()
+    numbers = buffers.numbers[first_number : first_number + end].copy()
     levels = list(map(loaded.__getitem__, ints[visited:phases].tolist()))
-    part = RecordPart(levels, counts[0], counts[4], events, functools.partial(_split, counts, ints, numbers))
+    part = RecordPart(levels, counts[0], counts[4], events, lambda: _split(counts, ints, numbers))
     after = of_run + OF_A_RUN
-    middle = (after + 1 + numbers_end) // 2
+    middle = (after + 1 + end) // 2
     state = LoopState(
         numbers[of_run:after],
         loaded[number] if number >= 0 else None,

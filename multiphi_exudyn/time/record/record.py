@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -63,6 +64,9 @@ class Record:
         self._parts: dict[str, GrowingArray] = {}
         self._unread: tuple[RecordPart, list[int]] | None = None  # last part, and numbers of its levels in this record
         self._last: dict[str, np.ndarray] = {}  # its arrays once they are read, not yet added to the parts
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_last": self._latest, "_unread": None}
 
     rows, instants, coordinates = _joined("rows"), _joined("instants"), _joined("coordinates")
     phases, left_out = _joined("phases"), _joined("left_out")

@@ -19,6 +19,7 @@ from multiphi_exudyn.time.segments.segment import Segment, Segments
 __all__ = ["Events", "Recorded"]
 
 T = TypeVar("T")
+NO_SUMS = np.full(a.VERDICT + 2 - a.WORKS, np.nan)
 
 
 class LazySequence(Sequence[T], Generic[T]):
@@ -54,23 +55,32 @@ class LazySequence(Sequence[T], Generic[T]):
 
 
 class Recorded(LazySequence[Segment], Segments):
-    """The segments of a record so far; defects, truncated: see Segments.
+    """The segments of a record so far.
 
-    summed: works [J] of all segments that the record does not list as left out.
+    sums: as the loop has them from WORKS on: works (3,) [J] of all segments that the record does not list as left out,
+    defects, truncated and verdict (2,), see Segments.
     """
 
-    def __init__(
-        self,
-        record: Record,
-        defects: float,
-        truncated: float,
-        summed: tuple[float, float, float],
-        verdict: tuple[float, float] = Segments.verdict,
-    ) -> None:
+    def __init__(self, record: Record, sums: np.ndarray = NO_SUMS) -> None:
         self._make, self._count, self._made = record.segment, record.count, {}
         self._record, self.arrays = record, record.arrays
-        self.defects, self.truncated, self.verdict = defects, truncated, verdict
-        self._summed, self._left_out = summed, record.left_out_count
+        self._sums, self._left_out = sums, record.left_out_count
+
+    @property
+    def defects(self) -> float:
+        """See ``Segments``."""
+        return float(self._sums[a.DEFECTS - a.WORKS])
+
+    @property
+    def truncated(self) -> float:
+        """See ``Segments``."""
+        return float(self._sums[a.TRUNCATED - a.WORKS])
+
+    @property
+    def verdict(self) -> tuple[float, float]:
+        """See ``Segments``."""
+        share, error = self._sums[a.VERDICT - a.WORKS :].tolist()
+        return share, error
 
     @functools.cached_property
     def starts(self) -> np.ndarray:
@@ -132,12 +142,13 @@ class Recorded(LazySequence[Segment], Segments):
     @property
     def works(self) -> tuple[float, float, float]:
         """See ``Segments``."""
-        return self._completed if self._left_out else self._summed
+        damping, varying, friction = self._sums[:3].tolist()
+        return self._completed if self._left_out else (damping, varying, friction)
 
     @functools.cached_property
     def _completed(self) -> tuple[float, float, float]:
         """The works, those of the segments that were left out included."""
-        damping, varying, friction = self._summed
+        damping, varying, friction = self._sums[:3].tolist()
         further = self._record.works(self._record.left_out[: self._left_out])
         return damping + further[0], varying + further[1], friction + further[2]
 

@@ -122,11 +122,9 @@ class Motion:
 
     def trajectory(self, end: float, again: Rerun | None = None) -> Trajectory:
         """Trajectory of the segments and events so far; again: see Trajectory."""
-        sums = self._final.numbers[a.WORKS : a.VERDICT + 2].tolist()
-        damped, varying, rubbed, defects, truncated, share, error = sums
         return Trajectory(
             model=self.model,
-            segments=Recorded(self.record, defects, truncated, (damped, varying, rubbed), (share, error)),
+            segments=Recorded(self.record, self._final.numbers[a.WORKS : a.VERDICT + 2]),
             events=self.events,
             t_end=self.time if self.message else end,
             status="failed" if self.message else "ok",

@@ -86,18 +86,21 @@ def first_start(
     """
     base, vector = levels.model.base, levels.model.structure.vector
     scales: _Scales = levels.starts.get_or_build(end, lambda: _Scales.of(levels, end))
-    known = None if rest is None else rest.coordinates(base)
-    if rest is not None and known is None:
-        displacement = rest.displacement
-    x = None if displacement is None else vector("displacement", displacement)
-    x_t = None if velocity is None else vector("velocity", velocity)
-    if scales.projection is None:
-        y, v = [np.zeros(len(scales.times)) if given is None else base.coordinates(given) for given in (x, x_t)]
-        y = y if known is None else known
+    projection, far = scales.projection, False
+    known = None if rest is None or velocity is not None else rest.coordinates(base)
+    if known is not None:
+        y, v = known, np.zeros(len(known))
+        far = projection is not None and projection.is_far_at_rest(y, compiled)
     else:
-        y, v, far = scales.projection.coordinates(x, x_t, known, compiled)
-        if far and scales.apart is not None:
-            return Start(y, v, (), (), scales.stops, scales.apart, NO_PLACES)
+        given = displacement if rest is None else rest.displacement
+        x = None if given is None else vector("displacement", given)
+        x_t = None if velocity is None else vector("velocity", velocity)
+        if projection is None:
+            y, v = [np.zeros(len(scales.times)) if each is None else base.coordinates(each) for each in (x, x_t)]
+        else:
+            y, v, far = projection.coordinates(x, x_t, compiled)
+    if far and scales.apart is not None:
+        return Start(y, v, (), (), scales.stops, scales.apart, NO_PLACES)
     moving = v * scales.times
     length = math.sqrt(y.dot(y)) + math.sqrt(moving.dot(moving))
     gaps, near = y.dot(base.directions) + scales.stops, scales.near(np.abs(y) @ base.magnitudes[0], length)

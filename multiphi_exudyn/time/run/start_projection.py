@@ -58,20 +58,26 @@ class StartProjection:
         self._is_far = check_far.bound(*self._arguments[:2])
 
     def coordinates(
-        self, x: np.ndarray | None, x_t: np.ndarray | None, known: np.ndarray | None, compiled: bool | None
+        self, x: np.ndarray | None, x_t: np.ndarray | None, compiled: bool | None
     ) -> tuple[np.ndarray, np.ndarray, bool]:
-        """Return y, y' (n,) of x, x' (n,), None for zero, and whether the bound shows that no gap is near zero.
-
-        known: y, where that is known and x is None.
-        """
+        """Return y, y' (n,) of x, x' (n,), None for zero, and whether the bound shows that no gap is near zero."""
         vectors = self._vectors
         vectors[:] = 0.0
         for i, given in enumerate((x, x_t)):
             if given is not None:
                 vectors[i] = given
                 self._onto.dot(vectors[i], out=vectors[2 + i])
-        if known is not None:
-            vectors[2] = known
-        far = check_far.plain(*self._arguments) if compiled is False else self._is_far(*self._arguments[2:])
+        far = self._check(compiled)
         y, v = vectors[2:].copy()
-        return y, v, far == 1
+        return y, v, far
+
+    def is_far_at_rest(self, y: np.ndarray, compiled: bool | None) -> bool:
+        """Whether the bound shows that no gap is near zero at y (n,)."""
+        self._vectors[:] = 0.0
+        self._vectors[2] = y
+        return self._check(compiled)
+
+    def _check(self, compiled: bool | None) -> bool:
+        """Clear y, y' of round-off, and return whether the bound shows that no gap is near zero."""
+        is_far = check_far.plain(*self._arguments) if compiled is False else self._is_far(*self._arguments[2:])
+        return bool(is_far)

@@ -111,16 +111,22 @@ class Segment(Shown):
 
 
 class Segments(Sequence[Segment], ABC):
-    """The segments of a run in order, with values of many of them as arrays.
+    """The segments of a run in order, with values of many of them as arrays."""
 
-    defects: sum of |defect|^2 (defects.py) [m2 kg], truncated: sum of the absolute energies [J] lost to truncation at
-    events; nan where the loop has not summed them. verdict: effect of truncation on the run (verdict.py), nan where it
-    is not known.
-    """
+    @property
+    def defects(self) -> float:
+        """Sum of |defect|^2 (defects.py) [m2 kg], nan where the loop has not summed them."""
+        return math.nan
 
-    defects = math.nan
-    truncated = math.nan
-    verdict = math.nan, math.nan
+    @property
+    def truncated(self) -> float:
+        """Sum of the absolute energies [J] lost to truncation at events, nan where the loop has not summed them."""
+        return math.nan
+
+    @property
+    def verdict(self) -> tuple[float, float]:
+        """Effect of truncation on the run (verdict.py), nan where it is not known."""
+        return math.nan, math.nan
 
     @property
     @abstractmethod

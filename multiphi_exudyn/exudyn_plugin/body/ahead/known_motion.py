@@ -7,7 +7,6 @@ times in it and the events with their times. Where the run fails, the interval e
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -123,8 +122,7 @@ class KnownMotion:
         motion.advance(until)
         self._continuation = motion.state, motion.time
         times, _, _, truncated = motion.events.table().T
-        works = (0.0, 0.0, 0.0)  # a body reports neither defects nor works
-        segments = Recorded(motion.record, math.nan, math.nan, works)
+        segments = Recorded(motion.record)  # a body reports neither defects nor works
         return MotionInterval(
             end=motion.time,
             events=motion.events,
