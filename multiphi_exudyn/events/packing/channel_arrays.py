@@ -17,20 +17,21 @@ PIECES_AT_ONCE = 1024  # packed at once, when the loop reaches the end of those 
 
 
 class ChannelArrays:
-    """Channels of ``levels`` in buffers; terms: the largest number of coefficients of a channel's piece.
+    """Channels of ``levels`` in buffers.
 
-    carriers: the largest number of coefficients of each carrier, by its rate, in the pieces packed so far.
+    prescribed: number of channels that are functions of time. terms: the largest number of coefficients of a piece of
+    theirs. carriers: the largest number of coefficients of each carrier, by its rate, in the pieces packed so far.
     """
 
     def __init__(self, levels: LoadedLevels) -> None:
-        self._excitation, self._until = levels.excitation, levels.until
+        self._excitation, self._until, self.prescribed = levels.excitation, levels.until, levels.excitation.prescribed
         self._pieces = Pieces(levels.excitation.histories, levels.drive.time, levels.until)
         self.terms = max((history.coefficients.shape[1] for history in levels.excitation.histories), default=0)
         self.carriers: dict[complex, int] = {}
 
     def describe(self, buffers: Buffers) -> None:
         """Write the number of channels and reserve memory for their values, in new buffers."""
-        q, ints = self._excitation.prescribed, buffers.ints
+        q, ints = self.prescribed, buffers.ints
         ints[a.CHANNELS], ints[a.PRESCRIBED] = self._excitation.channels, q
         slots = {a.DRIVE: buffers.take("numbers", 6 * q), a.SCALED_TERM: buffers.take("waves", self.terms * q)}
         for slot in (a.DRIVE_WAVES, a.DRIVE_NEXT):
@@ -41,7 +42,7 @@ class ChannelArrays:
 
     def reserve(self, buffers: Buffers) -> None:
         """Pack the next pieces."""
-        if not self._excitation.prescribed:
+        if not self.prescribed:
             return
         put, first, pieces = buffers.put, int(buffers.ints[a.PIECE_COUNT]), self._pieces
         if first == 0:
@@ -72,13 +73,13 @@ class ChannelArrays:
 
     def reserve_until(self, buffers: Buffers, piece: int) -> None:
         """Pack the pieces up to one."""
-        while self._excitation.prescribed and buffers.ints[a.PIECE_COUNT] <= piece:
+        while self.prescribed and buffers.ints[a.PIECE_COUNT] <= piece:
             self.reserve(buffers)
 
     @property
     def first_end(self) -> float:
         """End [s] of the first piece of the channels, or of the motion."""
-        return min(self._until, float(self._pieces.ends[0])) if self._excitation.prescribed else self._until
+        return min(self._until, float(self._pieces.ends[0])) if self.prescribed else self._until
 
     def drive(self, piece: int) -> Drive:
         """Return the channels from the start of a piece on."""
@@ -86,7 +87,7 @@ class ChannelArrays:
 
     def at(self, buffers: Buffers, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Set the channels to a time [s], and return w, w' (q,) of those that are functions of time."""
-        if not self._excitation.prescribed:
+        if not self.prescribed:
             self.set(buffers, 0, time - float(self._pieces.starts[0]), time)
             return np.zeros(0), np.zeros(0)
         piece = max(int(np.searchsorted(self._pieces.starts, time, side="right")) - 1, 0)
@@ -98,7 +99,7 @@ class ChannelArrays:
         """Set the channels to a time ``age`` [s] after the start of a piece, for the scales of the first state."""
         ints, numbers = buffers.ints, buffers.numbers
         ints[a.PIECE], numbers[a.AGE], numbers[a.HORIZON] = piece, age, 1.0
-        if not self._excitation.prescribed:
+        if not self.prescribed:
             return
         self.reserve_until(buffers, piece)
         channel_values.load_piece(buffers.ints, buffers.waves)

@@ -8,11 +8,13 @@ from multiphi_exudyn.events.arrays import (
     CAUSE,
     CHANGE_COUNT,
     CURRENT,
+    DECISIONS,
     DEFECTS,
     EVENT,
     FAILED,
     FORCED_ROOM,
     FORCED_WANTED,
+    FOUND,
     GIVEN,
     GIVEN_ENERGY,
     GIVEN_SPRINGS,
@@ -50,6 +52,7 @@ __all__ = ["begin_run", "continue_run", "fail_if_unavailable"]
 @compiled
 def begin_run(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     """Make the first state of the run the current one, with the events of the start; return OK, NEED or FAILED."""
+    ints[DECISIONS], ints[TRANSITIONS], numbers[ints[FOUND] + 1] = 0, 0, 0.0
     status = fail_if_unavailable(ints, begin(ints, numbers, waves))
     if ints[FORCED_WANTED] > ints[FORCED_ROOM]:
         ints[NEEDED], status = NEED_ROOM, NEED

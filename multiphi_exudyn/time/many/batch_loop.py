@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from multiphi_exudyn.events.arrays import (
     COUNTED,
-    DECISIONS,
     DRIVE_NEXT,
     END_REACHED,
     FOUND,
@@ -65,9 +64,8 @@ def advance_starts(
         for i in range(OF_A_RUN):
             numbers[i] = initial[i]
         ints[START], ints[STARTING], ints[STOP_AT_EVENT], ints[GIVEN_UP] = k, FRESH, 0, 0
-        ints[DECISIONS], ints[TRANSITIONS], ints[PIECE] = 0, 0, 0
-        numbers[ints[FOUND] + 1] = 0.0
         if ints[PRESCRIBED] > 0:
+            ints[PIECE] = 0
             load_piece(ints, waves)
             set_drive(ints, numbers, waves, ints[DRIVE_NEXT], 0.0, numbers[TIME], first_piece_end)
             keep_drive(ints, waves)

@@ -70,7 +70,7 @@ class Motion:
         """Numbers of a run at its start at a time [s]."""
         numbers = np.zeros(a.OF_A_RUN)
         numbers[a.TIME] = numbers[a.LAST_DECISION] = time
-        numbers[a.ALLOWED] = self._allowed
+        numbers[a.ALLOWED], numbers[a.HORIZON] = self._allowed, 1.0
         if self.levels.excitation.pushes:
             numbers[a.GIVEN_POTENTIAL] = self.levels.excitation.static.dot(self.start.displacement)
         return numbers
@@ -102,7 +102,8 @@ class Motion:
         self.time, self.message, self._starting = time, "", False
         self.record = Record(self.model.contacts, self.arrays)
         numbers, piece = self._final.numbers.copy(), self._final.piece
-        numbers[a.LAST_DECISION], numbers[a.DEFECTS] = time, math.nan
+        numbers[a.TIME] = numbers[a.LAST_DECISION] = time
+        numbers[a.DEFECTS] = math.nan
         numbers[a.LOOK_END] = numbers[a.LOOK_FIRST]
         numbers[a.LOST_AT_START : a.LOST_AT_START + a.LOSSES] = 0.0
         numbers[a.WORKS : a.WORKS + 3] = numbers[a.LOST_SO_FAR : a.LOST_SO_FAR + a.LOSSES] = 0.0
@@ -204,16 +205,17 @@ class Motion:
         arrays.begin_record()
         arrays.set_chatter(self._window, ending.decisions, ending.ring)
         arrays.buffers.numbers[: a.OF_A_RUN] = ending.numbers
-        arrays.channels.set(arrays.buffers, ending.piece, float(ending.numbers[a.AGE]), self.time)
+        if arrays.channels.prescribed:
+            arrays.channels.set(arrays.buffers, ending.piece, float(ending.numbers[a.AGE]), self.time)
         if ending.level is None:
             set_starts(arrays, (self.start,))
         else:
             set_state(arrays, level, ending.displacement, ending.velocity, ending.phases, self._measured)
-            arrays.ints[a.STARTING] = a.GOING_ON if self._starting else 0
-        ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
-        ints[a.TRANSITIONS], ints[a.GIVEN_UP] = ending.transitions, 0
-        ints[a.WORKING] = int(self.is_summing_works)
-        numbers[a.TIME], numbers[ints[a.FOUND] + 1] = self.time, ending.evaluations
+            ints, numbers = arrays.buffers.ints, arrays.buffers.numbers
+            ints[a.STARTING] = a.GOING_ON if self._starting else 0
+            ints[a.TRANSITIONS], numbers[ints[a.FOUND] + 1] = ending.transitions, ending.evaluations
+        ints = arrays.buffers.ints
+        ints[a.GIVEN_UP], ints[a.WORKING] = 0, int(self.is_summing_works)
 
     def _read_arrays(self) -> None:
         """Read the loop's state and record from the arrays."""
