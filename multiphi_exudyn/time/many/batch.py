@@ -168,11 +168,9 @@ class Batch:
         n, exits = level.level.modes, len(exits_of(level))
         phases = parts["phases"][waits : waits + exits].tolist() if waits >= 0 else [a.ARMED] * exits
         x = parts["coordinates"][start : start + 2 * n]
-        run_numbers, (evaluations, transitions) = (
-            self.run_numbers[k, :OF_A_RUN],
-            self.run_numbers[k, OF_A_RUN:].tolist(),
-        )
-        state = LoopState(run_numbers, level, x[:n], x[n:], tuple(phases), piece, evaluations, int(transitions))
+        evaluations, transitions = self.run_numbers[k, OF_A_RUN:].tolist()
+        counts = piece, evaluations, int(transitions)
+        state = LoopState(self.run_numbers[k, :OF_A_RUN], level, x[:n], x[n:], tuple(phases), *counts)
         numbers = np.zeros(len(self.levels), int)
         numbers[visited] = range(len(visited))
         rows[:, 0] = numbers[rows[:, 0]]

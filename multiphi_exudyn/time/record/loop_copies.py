@@ -78,15 +78,15 @@ OF_EVENTS = "kinds", "struck", "amounts", "impacts"
 
 @compiled
 def move_ints(ints: Ints, start: int, count: int, place: int) -> int:
-    """Move ``count`` ints down to a place, and return where the next ones go."""
-    for i in range(count if place < start else 0):
+    """Move ``count`` ints to a place before them, and return where the next ones go."""
+    for i in range(count if place != start else 0):
         ints[place + i] = ints[start + i]
     return place + count
 
 
 @compiled
 def copy_numbers(numbers: Numbers, start: int, count: int, place: int) -> int:
-    """Copy ``count`` numbers to a place, which is not within them, and return where the next ones go."""
+    """Copy ``count`` numbers to a place before or behind them, and return where the next ones go."""
     for i in range(count if place != start else 0):
         numbers[place + i] = numbers[start + i]
     return place + count

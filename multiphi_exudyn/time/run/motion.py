@@ -54,7 +54,7 @@ class Motion:
         loop: Callable[..., Any] | None = None,
     ) -> None:
         self.arrays, self.start = arrays, start
-        self._loop = carry.plain if compiled is False else loop
+        self._loop = loop or (carry.plain if compiled is False else None)
         self._measured: Measure = measured.plain if compiled is False else measured
         self.levels = arrays.levels
         self.model = self.levels.model
