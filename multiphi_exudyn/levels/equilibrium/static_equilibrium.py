@@ -51,7 +51,7 @@ class Equilibrium:
     Attributes
     ----------
     displacement : array (n,)
-        x [m, rad].
+        x [m, rad]; read-only where ``known`` belongs to it.
     stretches : mapping of str to float
         Of the springs of friction [m], by name, at a contact NAME.tangential; zero without a spring.
     known : tuple, default None
