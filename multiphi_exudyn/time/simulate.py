@@ -163,7 +163,7 @@ def holding(
 
     rows: (k, n) of further places at which forces act.
     """
-    at_rest = start is None or isinstance(start, Equilibrium)  # asked first: it takes a tenth of the next question
+    at_rest = start is None or isinstance(start, Equilibrium)  # asked first, as it is ten times cheaper
     if not at_rest and isinstance(start, Trajectory):
         return start.model if model.widened_to(start.model) else model
     if model.base.complete:

@@ -1,6 +1,7 @@
 """Starts in coordinates of the base, and which of them are seen at once to touch nothing."""
 
 import copy
+import dataclasses
 import math
 import pickle
 
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from small_structures import chain, stop
 
 import multiphi_exudyn as mp
@@ -109,8 +110,16 @@ def test_a_run_from_an_equilibrium_is_one_from_its_displacement_without_a_projec
         assert_array_equal(run.start.displacement, expected.start.displacement)
         assert_array_equal(run.events.table(), expected.events.table())
         assert run.start.states == expected.start.states
-    with pytest.raises(ValueError, match="read-only"):
-        rest.displacement[0] = 1.0  # it would not be that of its coordinates
+    for array in (rest.displacement, runs[-1].start.displacement):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0  # one would no longer be the other
+
+
+def test_an_equilibrium_that_is_replaced_is_another_start():
+    given = model(500.0)
+    rest = given.equilibrium({"m5": 0.5})
+    twice = dataclasses.replace(rest, displacement=2 * rest.displacement)
+    assert_allclose(mp.simulate(given, END, start=twice).displacement(0.0), 2 * rest.displacement, rtol=1e-12)
 
 
 def test_a_start_is_far_by_how_far_it_is_and_where_its_speed_takes_it():

@@ -51,11 +51,9 @@ class Equilibrium:
     Attributes
     ----------
     displacement : array (n,)
-        x [m, rad]; read-only where ``known`` belongs to it.
+        x [m, rad]; read-only if a model has made it, which keeps its coordinates for runs.
     stretches : mapping of str to float
         Of the springs of friction [m], by name, at a contact NAME.tangential; zero without a spring.
-    known : tuple, default None
-        A base and the displacement in its coordinates (m,), so that runs need not project it.
 
     Examples
     --------
@@ -73,21 +71,24 @@ class Equilibrium:
 
     displacement: np.ndarray
     stretches: Mapping[str, float]
-    known: tuple[ModalBase, np.ndarray] | None = field(default=None, repr=False, compare=False)
+    _known: tuple[ModalBase, np.ndarray] | None = field(default=None, init=False, repr=False, compare=False)
 
     @classmethod
     def of(cls, base: ModalBase, y: np.ndarray, stretches: Mapping[str, float]) -> Equilibrium:
-        """Equilibrium at y (m,) in base coordinates; its displacement is read-only, as what is known belongs to it."""
+        """Equilibrium at y (m,) in base coordinates, which it keeps, without their round-off, for runs from it."""
         x = base.modes.shapes @ y
-        x.setflags(write=False)
-        return cls(x, stretches, (base, base.coordinates(x)))
+        found, coordinates = cls(x, stretches), base.coordinates(x)
+        for array in (x, coordinates):  # neither may change without the other
+            array.setflags(write=False)
+        object.__setattr__(found, "_known", (base, coordinates))
+        return found
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.displacement, self.stretches)  # a copy does without the base
 
     def coordinates(self, base: ModalBase) -> np.ndarray | None:
         """Displacement in coordinates (m,) of a base where it is known there, else None."""
-        return self.known[1] if self.known is not None and self.known[0] is base else None
+        return self._known[1] if self._known is not None and self._known[0] is base else None
 
 
 @dataclass

@@ -106,7 +106,8 @@ class Batch:
 
     def _evaluate(self, function: Callable[..., Any], *given: Any) -> None:
         """Call a compiled function of the record until it has all that it needs."""
-        while self.call(function, *self.arrays.buffers.all, *self._record, *given) == NEED:
+        record = self._record  # may pack levels, and replace the buffers
+        while self.call(function, *self.arrays.buffers.all, *record, *given) == NEED:
             self.arrays.supply()
 
     def values(self, rows: Callable[[LoadedLevel], Sequence[np.ndarray]], points: int, times: np.ndarray) -> np.ndarray:

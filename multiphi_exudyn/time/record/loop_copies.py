@@ -60,6 +60,9 @@ from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves,
 
 __all__ = ["EMPTY", "LoopState", "RecordPart", "copy_loop"]
 
+OF_INTS = "rows", "phases", "left_out", "kinds", "struck"  # in the order of ``gather``
+OF_NUMBERS = "instants", "coordinates", "amounts", "impacts"
+OF_EVENTS = "kinds", "struck", "amounts", "impacts"
 EMPTY: dict[str, np.ndarray] = {  # numbers and places of segments and events: below 2**31 by RECORD_BYTES (motion.py)
     "rows": np.empty((0, a.SEGMENT_WIDTH), np.int32),
     "phases": np.empty(0, np.int8),
@@ -71,22 +74,19 @@ EMPTY: dict[str, np.ndarray] = {  # numbers and places of segments and events: b
     "amounts": np.empty((0, a.EVENT_WIDTH_NUMBERS)),
     "impacts": np.empty((0, a.IMPACT_WIDTH)),
 }
-OF_INTS = tuple(EMPTY)[:5]  # in the order in which a copy has them
-OF_NUMBERS = tuple(EMPTY)[5:]
-OF_EVENTS = "kinds", "struck", "amounts", "impacts"
 
 
 @compiled
 def move_ints(ints: Ints, start: int, count: int, place: int) -> int:
-    """Move ``count`` ints to a place before them, and return where the next ones go."""
+    """Move ``count`` ints to a place before them, overlapping or not, and return where the next ones go."""
     for i in range(count if place != start else 0):
         ints[place + i] = ints[start + i]
     return place + count
 
 
 @compiled
-def copy_numbers(numbers: Numbers, start: int, count: int, place: int) -> int:
-    """Copy ``count`` numbers to a place before or behind them, and return where the next ones go."""
+def move_numbers(numbers: Numbers, start: int, count: int, place: int) -> int:
+    """Do the same with numbers; to a place behind them, which does not overlap, they are copied."""
     for i in range(count if place != start else 0):
         numbers[place + i] = numbers[start + i]
     return place + count
@@ -130,16 +130,16 @@ def gather(ints: Ints, numbers: Numbers, waves: Waves) -> None:
     visited = move_ints(ints, ints[IMPACT_INTS], impacts, place)
     phases = visited + number_levels(ints, segments, visited)
     spot = first_number + (segments + 1 if segments > 0 else 0)
-    spot = copy_numbers(numbers, ints[COORDINATE_NUMBERS], ints[COORDINATE_COUNT], spot)
-    spot = copy_numbers(numbers, ints[EVENT_NUMBERS], changes * EVENT_WIDTH_NUMBERS, spot)
-    of_run = copy_numbers(numbers, ints[IMPACT_NUMBERS], impacts * IMPACT_WIDTH, spot)
-    spot = copy_numbers(numbers, ints[FOUND] + 1, 1, copy_numbers(numbers, 0, OF_A_RUN, of_run))
+    spot = move_numbers(numbers, ints[COORDINATE_NUMBERS], ints[COORDINATE_COUNT], spot)
+    spot = move_numbers(numbers, ints[EVENT_NUMBERS], changes * EVENT_WIDTH_NUMBERS, spot)
+    of_run = move_numbers(numbers, ints[IMPACT_NUMBERS], impacts * IMPACT_WIDTH, spot)
+    spot = move_numbers(numbers, ints[FOUND] + 1, 1, move_numbers(numbers, 0, OF_A_RUN, of_run))
     place = phases
     if ints[STARTING] == 0:
         level = ints[CURRENT + LEVEL]
         n, number = ints[level + MODES] + ints[CHANNELS], ints[level + NUMBER]
-        spot = copy_numbers(numbers, ints[CURRENT + PLACE], n, spot)
-        spot = copy_numbers(numbers, ints[CURRENT + SPEED], n, spot)
+        spot = move_numbers(numbers, ints[CURRENT + PLACE], n, spot)
+        spot = move_numbers(numbers, ints[CURRENT + SPEED], n, spot)
         for e in range(ints[level + EXIT_COUNT]):
             ints[place + e] = ARMED if ints[CURRENT + SETTLED] == 1 else ints[ints[CURRENT + PHASES] + e]
         place += ints[level + EXIT_COUNT]

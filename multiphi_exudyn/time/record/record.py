@@ -77,7 +77,7 @@ class Record:
         self.append(copy_loop(self.arrays)[0])
 
     def collect_events(self) -> None:
-        """Copy the loop's events to this record, none of its segments; the caller begins a new record in the arrays."""
+        """Move the loop's events to this record; what it has of segments is left to the next ``begin_record``."""
         if self.arrays.ints[a.EVENT_COUNT]:
             self.append(copy_loop(self.arrays)[0].without_segments())
 

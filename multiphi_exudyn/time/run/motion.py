@@ -195,6 +195,7 @@ class Motion:
     def take_over(self) -> None:
         """Write this run into the arrays, unless they already hold it."""
         if self.arrays.owner is None or self.arrays.owner() is not self:
+            self.arrays.owner = None  # in case that this fails half-way
             self._write_arrays()
             self.arrays.owner = weakref.ref(self)
 

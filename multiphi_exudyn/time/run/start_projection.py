@@ -9,7 +9,9 @@ Most starts touch nothing: they need none of the checks of every contact in star
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -55,7 +57,11 @@ class StartProjection:
         arrays = np.concatenate([np.zeros(4 * n), times, sizes.sum(axis=1), links.ravel()])
         self._onto, self._vectors = onto, arrays[: 4 * n].reshape(4, n)
         self._arguments = arrays, sizes.ravel(), n, len(links), near
-        self._is_far = check_far.bound(*self._arguments[:2])
+
+    @functools.cached_property
+    def _is_far(self) -> Callable[..., int]:
+        """The compiled check of these arrays."""
+        return check_far.bound(*self._arguments[:2])
 
     def coordinates(
         self, x: np.ndarray | None, x_t: np.ndarray | None, compiled: bool | None
