@@ -197,6 +197,14 @@ class TestSeveralRunsTogether:
         for name, values in short.parts.items():
             assert_array_equal(values, whole.parts[name][: len(values)])
 
+    def test_decisions_of_one_run_are_no_chatter_of_the_next(self, monkeypatch):
+        """A window of the check that reached back into another run would have no time in it, and end the call."""
+        monkeypatch.setattr("multiphi_exudyn.time.loop.chatter.CHATTER_WINDOW", 1)
+        levels, given = begun(model("all", stiffness=50.0), starts(5))
+        together = carried(LevelArrays(levels), given)
+        assert together.count == 5
+        assert np.all(together.events > 2)
+
     def test_with_friction(self, calls):
         """States, held places and warnings of friction are of each run."""
         x, given = np.random.default_rng(3).uniform(-0.3, 0.3, (30, 6)), []
