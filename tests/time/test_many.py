@@ -75,16 +75,18 @@ LOADS = {
     "constant": (mp.ConstantLoad("m3", 0.2),),
     "harmonic": (mp.HarmonicLoad("m1", 0.3, 0.2),),
     "function": (mp.FunctionLoad("m1", lambda t: 0.1 * np.sin(t)),),
+    "sampled": (mp.SampledLoad("m1", np.array([0.0, 1.0, 2.5, 9.0]), np.array([0.0, 0.3, -0.2, 0.4])),),
 }
 
 
 @pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
 @pytest.mark.parametrize(
-    ("stiffness", "loads"), [(50.0, "none"), (50.0, "harmonic"), (math.inf, "constant"), (math.inf, "function")]
+    ("stiffness", "loads"),
+    [(50.0, "none"), (50.0, "harmonic"), (50.0, "sampled"), (math.inf, "constant"), (math.inf, "function")],
 )
 def test_are_those_of_simulate_to_the_bit(loads, stiffness):
     points = ("m5", {"m0": 1.0, "m2": -2.0}, np.eye(6)[4])
-    given, x = LOADS[loads], starts(5)
+    given, x = LOADS[loads], starts(17)  # the first ones find levels that are not packed, and are run alone
     runs = alone(model(stiffness=stiffness), x, loads=given)
     assert sum(len(run.events) for run in runs) > 12
     for threads in (1, 3):
