@@ -81,12 +81,19 @@ LOADS = {
 
 @pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
 @pytest.mark.parametrize(
-    ("stiffness", "loads"),
-    [(50.0, "none"), (50.0, "harmonic"), (50.0, "sampled"), (math.inf, "constant"), (math.inf, "function")],
+    ("stiffness", "loads", "count"),
+    [
+        (50.0, "none", 17),
+        (50.0, "harmonic", 17),
+        (50.0, "sampled", 17),
+        (math.inf, "constant", 17),
+        (math.inf, "function", 5),
+    ],
 )
-def test_are_those_of_simulate_to_the_bit(loads, stiffness):
+def test_are_those_of_simulate_to_the_bit(loads, stiffness, count):
+    """The first ones find levels that are not packed, and are run alone; later ones in batches, but under a function."""
     points = ("m5", {"m0": 1.0, "m2": -2.0}, np.eye(6)[4])
-    given, x = LOADS[loads], starts(17)  # the first ones find levels that are not packed, and are run alone
+    given, x = LOADS[loads], starts(count)
     runs = alone(model(stiffness=stiffness), x, loads=given)
     assert sum(len(run.events) for run in runs) > 12
     for threads in (1, 3):
