@@ -91,7 +91,7 @@ LOADS = {
     ],
 )
 def test_are_those_of_simulate_to_the_bit(loads, stiffness, count):
-    """The first ones find levels that are not packed, and are run alone; later ones in batches, but under a function."""
+    """The first ones find levels that are not packed, and are run alone; later ones in batches, not under functions."""
     points = ("m5", {"m0": 1.0, "m2": -2.0}, np.eye(6)[4])
     given, x = LOADS[loads], starts(count)
     runs = alone(model(stiffness=stiffness), x, loads=given)
