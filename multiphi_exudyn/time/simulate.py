@@ -233,7 +233,7 @@ class Run:
     @property
     def _before(self) -> Trajectory | None:
         """Trajectory that this run continues, None for a new one."""
-        return None if self.start is None or isinstance(self.start, Equilibrium) else self.start
+        return None if isinstance(self.start, Equilibrium) else self.start
 
     @property
     def rest(self) -> Equilibrium | None:
@@ -267,8 +267,8 @@ class Run:
 
     def _rerun(self, y: np.ndarray, v: np.ndarray) -> Trajectory:
         """Trajectory of the same run from y, y' (m,) in base coordinates."""
-        if isinstance(self.start, Trajectory):
-            return replace(self, start=with_final_velocity(self.start, v), ahead=None).trajectory()
+        if self._before is not None:
+            return replace(self, start=with_final_velocity(self._before, v), ahead=None).trajectory()
         x, x_t = self.model.base.modes.shapes @ y, self.model.base.modes.shapes @ v
         if self.rest is not None:
             return replace(self, start=Equilibrium(x, self.rest.stretches), velocity=x_t, ahead=None).trajectory()

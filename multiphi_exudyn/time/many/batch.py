@@ -70,7 +70,7 @@ class Batch:
         part, _ = copy_loop(arrays)
         return cls(arrays, starts, end, call, count_done, part.levels, EMPTY | part.arrays(), ends, run_numbers)
 
-    @property
+    @functools.cached_property
     def events(self) -> np.ndarray:
         """Numbers of events of the runs (count,)."""
         events_so_far = np.concatenate([[0], np.cumsum(self.parts["kinds"][:, 1] != a.SHARED)])
@@ -186,9 +186,8 @@ class Batch:
             "amounts": parts["amounts"][e:e_end],
             "impacts": parts["impacts"][i:i_end],
         }
-        events = int(np.count_nonzero(arrays["kinds"][:, 1] != a.SHARED))
         levels = [self.levels[number] for number in visited]
-        part = RecordPart(levels, s_end - s - 1, left_end - left, events, lambda: arrays)
+        part = RecordPart(levels, s_end - s - 1, left_end - left, int(self.events[k]), lambda: arrays)
         motion = Motion(self.arrays, self.starts[k])
         motion.take_result(part, state)
         return motion

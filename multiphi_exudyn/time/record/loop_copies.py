@@ -1,7 +1,7 @@
 """Loop copies: the record of the loop (loop_record.py) and its state, copied out of its arrays by one compiled call.
 
-The copy is two blocks. The arrays of a record are taken from them when they are first read: a run of which only some
-samples are wanted would spend as long on them as on ten of its events.
+The copy is two blocks. The arrays of a record are taken from them when they are first read: to take them at once would
+make a short run longer.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ EMPTY: dict[str, np.ndarray] = {  # numbers and places of segments and events: b
 
 @compiled
 def move_ints(ints: Ints, start: int, count: int, place: int) -> int:
-    """Move ``count`` ints to a place before them, overlapping or not, and return where the next ones go."""
+    """Move ints to a place before them, which may overlap with theirs, and return where the next ones go."""
     for i in range(count if place != start else 0):
         ints[place + i] = ints[start + i]
     return place + count
@@ -86,7 +86,10 @@ def move_ints(ints: Ints, start: int, count: int, place: int) -> int:
 
 @compiled
 def move_numbers(numbers: Numbers, start: int, count: int, place: int) -> int:
-    """Do the same with numbers; to a place behind them, which does not overlap, they are copied."""
+    """Move numbers to a place before them, or copy them to one behind, and return where the next ones go.
+
+    A place before them may overlap with theirs, one behind them may not.
+    """
     for i in range(count if place != start else 0):
         numbers[place + i] = numbers[start + i]
     return place + count
