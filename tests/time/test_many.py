@@ -186,7 +186,7 @@ class TestSeveralRunsTogether:
 
     def test_one_pressed_against_a_rigid_contact_at_its_start(self, calls):
         """Its numbers do not tell what its first level leaves out of it; the run as a whole does."""
-        x, loads = starts(24, most=0.11), [mp.ConstantLoad("m5", -9.0)]
+        x, loads = starts(32, most=0.11), [mp.ConstantLoad("m5", -9.0)]
         x[::2], x[::2, 5] = np.linspace(0, -0.1, 6), -0.1
         runs = alone(model(3), x, loads=loads)
         check(mp.simulate_many(model(3), END, x, loads=loads, points=["m5"], times=TIMES, threads=1), runs, ["m5"])

@@ -15,6 +15,8 @@ from small_structures import chain, random_model, stop
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.events.transitions.state import event_table
+from multiphi_exudyn.levels.level import level
+from multiphi_exudyn.mathematics.response.coupled_response import modal_response
 from multiphi_exudyn.time.loop import chatter
 from multiphi_exudyn.time.reliability.defects import defects
 from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
@@ -482,3 +484,44 @@ def test_a_mode_too_slow_for_a_run_is_told_with_what_is_lost(stiffness, told):
         omega = math.sqrt(stiffness)
         expected = 6.0 if omega == 0 else 3.0 * (1 - math.cos(2 * omega)) / stiffness
         assert run.at("m", 2.0) == pytest.approx(expected, rel=1e-9)
+
+
+class TestOpenLedger:
+    """A level whose modes do not move as its own equation says: nothing else in a run would tell."""
+
+    UNITS = ((1.0, 1.0), (2.0**-20, 2.0**30))  # of length and of mass
+
+    def run(self, length=1.0, mass=1.0, loads=(), many=False):
+        structure = chain(4, mass=mass, stiffness=40.0 * mass, damping=mp.ModalDamping(0.01))
+        model = mp.MultiPhiModel(structure, [stop("m3", 0.05 * length, 400.0 * mass)], modes="all")
+        x = 0.1 * length * np.arange(4.0)
+        loads = [mp.ConstantLoad("m1", force * length * mass) for force in loads]
+        if many:
+            return mp.simulate_many(model, 3.0, np.outer([0.8, 1.0, 1.1], x), loads=loads, threads=1)
+        return mp.simulate(model, 3.0, displacement=x, loads=loads)
+
+    @pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
+    @pytest.mark.parametrize("loads", [(), (-1.5,)], ids=["free", "loaded"])
+    @pytest.mark.parametrize("units", UNITS)
+    def test_is_told_with_its_share(self, units, loads, monkeypatch):
+        assert self.run(*units, loads).warnings == ()
+        monkeypatch.setattr(level, "modal_response", lambda squares, *rest: modal_response(1.01 * squares, *rest))
+        run, many = self.run(*units, loads), self.run(*units, loads, many=True)
+        share = abs(run.ledger.residual) / run.ledger.turned_over
+        assert 1e-4 < share < 1e-2
+        (told,) = (sentence for sentence in run.warnings if sentence.startswith("open ledger: "))
+        assert float(told.split(": ")[1].split(" %")[0]) == pytest.approx(100 * share, rel=0.1)
+        assert many.warnings[1] == run.warnings
+        assert all("open ledger" in "".join(sentences) for sentences in many.warnings)
+
+    @pytest.mark.parametrize("row", ["friction", "damping", "impact"])
+    def test_of_a_row_that_gives_what_it_can_only_take(self, row, monkeypatch):
+        run = self.run()
+        closed, gift = run.ledger, 1e-2 * run.ledger.initial
+        given = replace(closed, **{row: -gift, "final": closed.final + gift + getattr(closed, row)})
+        monkeypatch.setattr(mp.Trajectory, "ledger", given)
+        assert abs(given.residual) < 1e-12 * closed.initial
+        (told,) = warnings_of(run)
+        assert told.startswith(f"open ledger: {row} gave 0.")
+        monkeypatch.setattr(mp.Trajectory, "ledger", replace(given, **{row: -1e-14 * gift, "final": closed.final}))
+        assert ("open ledger" in "".join(warnings_of(run))) == (getattr(closed, row) > 0)

@@ -2,6 +2,8 @@
 
 Every warning is one plain sentence with its number. It begins with its kind and a colon; many runs group them by kind:
 
+    "open ledger: ..."        energy that is not accounted for, or that friction, damping or impacts gave: the result is
+                              wrong (ledger_warnings.py)
     "truncated contact: ..."  static flexibility that a closed compliant level's modes leave out (level.py): peak
                               contact forces are off; known before any run
     "truncated friction: ..." levels in which friction sticks with few modes: its force there is off
@@ -41,6 +43,7 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.time.loop.verdict import lost_share
 from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
 from multiphi_exudyn.time.reliability.impact_warnings import impact_warnings
+from multiphi_exudyn.time.reliability.ledger_warnings import ledger_warnings
 from multiphi_exudyn.time.reliability.truncation_warnings import energy_warning, truncation_warnings, verdict_of
 from multiphi_exudyn.time.segments.segment import Segments
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
@@ -64,7 +67,7 @@ PIECE_BYTES = 500  # that it takes there, its segment included
 def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[str, ...]:
     """Warnings of a run, one sentence each; tolerance: the one that decided its modes.
 
-    All warnings but those of truncation are the same for runs of one length in the same levels, and are cached for
+    All warnings but those of the ledger and of truncation are the same for runs of one length in the same levels, and are cached for
     them, unless friction or the model's own check needs the motion of every run.
     """
     record, model = trajectory.ending.record, trajectory.model
@@ -79,6 +82,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
         if not general.needs_motion:
             cache.keep(key, entry)
     general, before, after = entry
+    before = (*ledger_warnings(trajectory), *before)
     share, error = trajectory.segments.verdict
     if tolerance is not None or not (share >= 0 and error >= 0):
         share, error = verdict_of(trajectory, tolerance)

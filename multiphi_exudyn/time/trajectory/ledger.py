@@ -84,6 +84,13 @@ class Ledger(Shown):
         lost = self.impact + self.truncation_kinetic + self.truncation_strain + self.damping + self.friction
         return self.initial + self.work_of_loads - lost - self.final
 
+    @property
+    def turned_over(self) -> float:
+        """Sum of the absolute values of all rows [J]: the scale of the residual."""
+        lost = abs(self.impact) + abs(self.truncation_kinetic) + abs(self.truncation_strain)
+        lost += abs(self.damping) + abs(self.friction)
+        return abs(self.initial) + abs(self.work_of_loads) + lost + abs(self.final)
+
     def _facts(self) -> Iterator[tuple[str, str]]:
         for name in (*(entry.name for entry in fields(self)), "residual"):
             yield name.replace("_", " "), f"{getattr(self, name):.4g} J"

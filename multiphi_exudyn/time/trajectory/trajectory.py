@@ -70,7 +70,7 @@ class Trajectory(ModelHistories):
         The static load in base coordinates.
     warnings : tuple of str
         What to distrust in this result and what to do about it, one sentence each that begins with its kind and a
-        colon: truncated contact, truncated friction, lost energy, truncation, undamped modes, damping ratios, missing
+        colon: open ledger, truncated contact, truncated friction, lost energy, truncation, undamped modes, damping ratios, missing
         modes, linear range, cluster, base, load pieces.
     again : callable
         Function that repeats the run from other y, y' (m,), without warnings.
