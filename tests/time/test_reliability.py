@@ -14,10 +14,12 @@ from numpy.testing import assert_allclose
 from small_structures import chain, random_model, stop
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.transitions.state import event_table
 from multiphi_exudyn.levels.level import level
 from multiphi_exudyn.mathematics.response.coupled_response import modal_response
 from multiphi_exudyn.time.loop import chatter
+from multiphi_exudyn.time.loop.verdict import is_balanced
 from multiphi_exudyn.time.reliability.defects import defects
 from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
 from multiphi_exudyn.time.reliability.run_warnings import warnings_of
@@ -517,6 +519,7 @@ class TestOpenLedger:
     @pytest.mark.parametrize("row", ["friction", "damping", "impact"])
     def test_of_a_row_that_gives_what_it_can_only_take(self, row, monkeypatch):
         run = self.run()
+        run.ending.numbers[a.BALANCED] = 0.0
         closed, gift = run.ledger, 1e-2 * run.ledger.initial
         given = replace(closed, **{row: -gift, "final": closed.final + gift + getattr(closed, row)})
         monkeypatch.setattr(mp.Trajectory, "ledger", given)
@@ -525,3 +528,36 @@ class TestOpenLedger:
         assert told.startswith(f"open ledger: {row} gave 0.")
         monkeypatch.setattr(mp.Trajectory, "ledger", replace(given, **{row: -1e-14 * gift, "final": closed.final}))
         assert ("open ledger" in "".join(warnings_of(run))) == (getattr(closed, row) > 0)
+
+    @pytest.mark.parametrize("row", [a.LOST_SO_FAR + a.BY_IMPACT, a.LOST_AT_START + a.FRICTION, a.WORKS, a.WORKS + 2])
+    def test_the_loop_finds_a_row_that_gives(self, row):
+        numbers = self.run().ending.numbers
+        final = numbers[a.GIVEN_ENERGY] - numbers[a.WORKS]
+        assert is_balanced(numbers, final) == 1.0
+        for share, balanced in ((1e-2, 0.0), (1e-9, 1.0)):
+            changed, gift = numbers.copy(), share * numbers[a.GIVEN_ENERGY] + numbers[row]
+            changed[row] -= gift
+            assert is_balanced(changed, final + gift) == balanced
+            assert is_balanced(numbers, final + share * numbers[a.GIVEN_ENERGY]) == balanced
+
+    def test_not_where_dampers_of_a_level_give(self):
+        """A negative ratio that was given, and a damper that is stretched where modes are left out."""
+        override = {(): mp.LevelOverride(None, [-0.1])}
+        model = mp.MultiPhiModel(chain(2), [stop("m0", 0.5, 30.0)], "all", override)
+        assert mp.simulate(model, 30.0, displacement=[0.1, 0.2]).ledger.damping < -0.1
+        contact = mp.UnilateralContact("stop", "m3", 0.2, 40.0, 4.0)
+        truncated = mp.MultiPhiModel(chain(6), [contact], modes=4)
+        for run in (
+            mp.simulate(model, 30.0, displacement=[0.1, 0.2]),
+            mp.simulate(truncated, 60.0, velocity=np.arange(6.0) / 3),
+        ):
+            assert "open ledger" not in kinds(run)
+
+    def test_not_of_what_rests_under_its_loads(self):
+        """All energies are round-off of the motion that the load would make."""
+        bar = mp.LinearStructure(np.eye(2) / 3 + 1 / 6 - np.eye(2) / 6, np.zeros((2, 2)), None, {"a": 0, "b": 1})
+        for scale in (1.0, 2.0**-30, 2.0**40):
+            for share in (0.25, 0.3, 0.7):
+                model = mp.MultiPhiModel(bar, [stop(end, 0.0, name=end) for end in "ab"], modes="all")
+                run = mp.simulate(model, 1.0, loads=[mp.ConstantLoad(np.array([share - 1, -share]), scale)])
+                assert run.warnings == ()

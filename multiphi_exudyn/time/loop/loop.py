@@ -12,6 +12,7 @@ import math
 
 from multiphi_exudyn.events.arrays import (
     AGE,
+    BALANCED,
     CARRIED,
     CAUSE,
     CHANGE_COUNT,
@@ -95,7 +96,7 @@ from multiphi_exudyn.mathematics.search.zero_crossing import INSTANT, NONE, firs
 from multiphi_exudyn.time.loop.loop_record import is_chatter, keep_events, keep_segment
 from multiphi_exudyn.time.loop.motion_size import INDICATOR, begin_size_samples, keep_size_samples, sample_motion_size
 from multiphi_exudyn.time.loop.run_start import begin_run, continue_run, fail_if_unavailable
-from multiphi_exudyn.time.loop.verdict import set_verdict
+from multiphi_exudyn.time.loop.verdict import is_balanced, set_verdict
 from multiphi_exudyn.time.loop.work_sums import work_of_segment
 
 __all__ = ["advance"]
@@ -107,11 +108,14 @@ SEARCH_TOO_LONG = -3  # zero_crossing.TOO_LONG
 def advance(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> int:
     """Advance the state CURRENT, or the start, to ``end`` [s] or to what stops the run before.
 
-    Return END_REACHED, EVENT, NEED, FULL or FAILED. The energy of the final state and the verdict are set on the way.
+    Return END_REACHED, EVENT, NEED, FULL or FAILED. The energy of the final state, whether the ledger is closed, and
+    the verdict are set on the way.
     """
     status = run_segments(ints, numbers, waves, end)
-    final_energy = kinetic(ints, numbers, CURRENT) + strain(ints, numbers, CURRENT) if ints[STARTING] == 0 else math.nan
-    numbers[LEFT_ENERGY] = final_energy
+    numbers[LEFT_ENERGY], numbers[BALANCED] = math.nan, 0.0
+    if ints[STARTING] == 0:
+        numbers[LEFT_ENERGY] = kinetic(ints, numbers, CURRENT) + strain(ints, numbers, CURRENT)
+        numbers[BALANCED] = is_balanced(numbers, energy(ints, numbers, CURRENT))
     if ints[JUDGED] == 1:
         set_verdict(numbers, ints[ISOLATED], INDICATOR, numbers[TIME])
     return status

@@ -13,7 +13,10 @@ from __future__ import annotations
 import math
 
 from multiphi_exudyn.events.arrays import (
+    BY_IMPACT,
+    DAMPING,
     DEFECTS,
+    FRICTION,
     GIVEN_ENERGY,
     GIVEN_POTENTIAL,
     GIVEN_SQUARE,
@@ -21,16 +24,21 @@ from multiphi_exudyn.events.arrays import (
     LOOK_END,
     LOOKED,
     LOST_AT_START,
+    LOST_SO_FAR,
+    STOP_WORK,
     STRAIN,
     TRUNCATED,
     VERDICT,
+    WORK,
+    WORKS,
 )
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled
 from multiphi_exudyn.time.loop.motion_size import SAMPLES, is_small
 
-__all__ = ["indicator", "lost_share", "set_verdict"]
+__all__ = ["OPEN", "indicator", "is_balanced", "lost_share", "set_verdict"]
 
 ENERGY_SHARE = 0.01  # of the largest energy of a run
+OPEN = 1e-6  # of the energies turned over: what a ledger may leave open (time/reliability/ledger_warnings.py)
 
 
 @compiled
@@ -70,3 +78,22 @@ def indicator(lost: float, square: float) -> float:
     if square == 0.0:
         return math.inf if lost != 0.0 else 0.0
     return math.sqrt(lost / square)
+
+
+@compiled
+def is_balanced(numbers: Numbers, final: float) -> float:
+    """Return 1 where the ledger is closed and friction, damping and impacts have taken energy, else 0.
+
+    final: kinetic and strain energy of the last state less the potential of static loads [J]. Segments whose works are
+    left out are missing.
+    """
+    impact = numbers[LOST_AT_START + BY_IMPACT] + numbers[LOST_SO_FAR + BY_IMPACT]
+    damping = numbers[LOST_AT_START + DAMPING] + numbers[LOST_SO_FAR + DAMPING] + numbers[WORKS]
+    friction = numbers[LOST_AT_START + FRICTION] + numbers[LOST_SO_FAR + FRICTION] + numbers[WORKS + 2]
+    work = numbers[LOST_AT_START + STOP_WORK] + numbers[LOST_SO_FAR + STOP_WORK] + numbers[WORKS + 1] + numbers[WORK]
+    truncated = numbers[LOST_AT_START + KINETIC] + numbers[LOST_SO_FAR + KINETIC]
+    truncated += numbers[LOST_AT_START + STRAIN] + numbers[LOST_SO_FAR + STRAIN]
+    limit = OPEN * (abs(numbers[GIVEN_ENERGY]) + abs(final) + abs(work))
+    left = numbers[GIVEN_ENERGY] + work - impact - damping - friction - truncated - final
+    is_taken = impact >= -limit and damping >= -limit and friction >= -limit
+    return 1.0 if is_taken and abs(left) <= limit else 0.0

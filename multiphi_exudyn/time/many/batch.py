@@ -150,36 +150,9 @@ class Batch:
         for k in runs:
             compute_verdict(self.run_numbers[k], isolated, limit, self.end)
 
-    def closed_ledgers(self, share: float) -> list[bool]:
-        """Whether the numbers of each run show a ledger closed to a share of the energies turned over (ledger.py).
-
-        A run whose numbers do not suffice, because works were left out or a level has no form of its energy, has none.
-        """
-        numbers, static = self.run_numbers[: self.count], self._static_works
-        rows = numbers[:, a.LOST_AT_START : a.LOST_SO_FAR] + numbers[:, a.LOST_SO_FAR : a.WORK]
-        damping, varying, friction = numbers[:, a.WORKS : a.WORKS + 3].T
-        initial, final = numbers[:, a.GIVEN_ENERGY] + numbers[:, a.GIVEN_POTENTIAL], numbers[:, a.LEFT_ENERGY]
-        work = static + rows[:, a.STOP_WORK] + varying + numbers[:, a.WORK]
-        lost = rows[:, [a.BY_IMPACT, a.KINETIC, a.STRAIN, a.DAMPING, a.FRICTION]]
-        lost[:, 3] += damping
-        lost[:, 4] += friction
-        limits = share * (np.abs(initial) + np.abs(work) + np.abs(lost).sum(axis=1) + np.abs(final))
-        is_closed = np.abs(initial + work - lost.sum(axis=1) - final) <= limits
-        is_closed &= np.min(lost[:, [0, 3, 4]], axis=1) >= -limits
-        is_closed &= np.diff(self.ends[: self.count + 1, 4]) == 0
-        closed: list[bool] = is_closed.tolist()
-        return closed
-
-    @property
-    def _static_works(self) -> np.ndarray:
-        """Work [J] of static loads in every run (count,)."""
-        excitation, works = self.arrays.levels.excitation, np.zeros(self.count)
-        for k in range(self.count) if excitation.pushes else ():
-            number, _, start, _ = self.parts["rows"][self.ends[k + 1, 0] - 1].tolist()
-            level = self.levels[number]
-            displacement = level.configuration(self.parts["coordinates"][start : start + level.level.modes])
-            works[k] = excitation.static.dot(displacement) - self.run_numbers[k, a.GIVEN_POTENTIAL]
-        return works
+    def is_balanced(self, k: int) -> bool:
+        """Whether the numbers of a run show that its ledger is closed: no works were left out."""
+        return bool(self.run_numbers[k, a.BALANCED] == 1.0 and self.ends[k, 4] == self.ends[k + 1, 4])
 
     def has_defects(self, k: int) -> bool:
         """Whether all defects of a run are known."""

@@ -34,6 +34,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.display import per_cent
+from multiphi_exudyn.events.arrays import BALANCED
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import event_table
@@ -82,7 +83,8 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
         if not general.needs_motion:
             cache.keep(key, entry)
     general, before, after = entry
-    before = (*ledger_warnings(trajectory), *before)
+    if trajectory.ending.numbers[BALANCED] != 1.0 or record.left_out_count:
+        before = (*ledger_warnings(trajectory), *before)
     share, error = trajectory.segments.verdict
     if tolerance is not None or not (share >= 0 and error >= 0):
         share, error = verdict_of(trajectory, tolerance)
