@@ -7,7 +7,7 @@ ends the trajectory early, with a status and its cause.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -22,6 +22,8 @@ from multiphi_exudyn.levels.model.mode_choice import Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.compiling.compiled import available
 from multiphi_exudyn.mechanics.loads.loads import Load, patterns, unchanging
+from multiphi_exudyn.mechanics.loads.moving_supports import StopsMotion
+from multiphi_exudyn.mechanics.loads.time_functions import Harmonic
 from multiphi_exudyn.mechanics.structures.arguments import is_real
 from multiphi_exudyn.time.reliability.run_warnings import warnings_of
 from multiphi_exudyn.time.reliability.truncation import run_with_enough_modes
@@ -265,10 +267,17 @@ class Run:
             self.model.decide(trajectory.model)
         return trajectory
 
-    def _rerun(self, y: np.ndarray, v: np.ndarray) -> Trajectory:
-        """Trajectory of the same run from y, y' (m,) in base coordinates."""
+    def _rerun(self, y: np.ndarray, v: np.ndarray, gaps: Mapping[str, float]) -> Trajectory:
+        """Trajectory of the same run from y, y' (m,) in base coordinates, its gaps smaller at the end.
+
+        gaps: by how much [m], by contacts, of a run that continues no other; they change from the start on, where a
+        contact may touch.
+        """
         if self._before is not None:
             return replace(self, start=with_final_velocity(self._before, v), ahead=None).trajectory()
+        if gaps:
+            drift = StopsMotion(gaps, Harmonic(1.0, 0.25 / self.t_end, -0.5 * math.pi))
+            return replace(self, loads=(*self.loads, drift))._rerun(y, v, {})
         x, x_t = self.model.base.modes.shapes @ y, self.model.base.modes.shapes @ v
         if self.rest is not None:
             return replace(self, start=Equilibrium(x, self.rest.stretches), velocity=x_t, ahead=None).trajectory()

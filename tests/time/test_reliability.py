@@ -333,6 +333,59 @@ class TestHorizon:
         run = mp.simulate(mp.MultiPhiModel(chain(3), modes="all"), 20.0, velocity=np.ones(3))
         assert run.horizon(1e-3) == run.t_end
 
+    @pytest.mark.parametrize("scale", [1.0, 2.0**-20, 2.0**30])
+    @pytest.mark.parametrize("restitution", [0.0, 0.5])
+    @pytest.mark.parametrize("height", [0.5, 0.2])
+    def test_a_bar_that_falls_flat_is_determined_until_it_strikes(self, scale, restitution, height):
+        """Its motion has no tilt, and a tilt of 1e-12 changes all that follows."""
+        feet = {"y": 0, "phi": 1, "l": np.array([1.0, -0.5 * scale]), "r": np.array([1.0, 0.5 * scale])}
+        bar = mp.LinearStructure(np.diag([1.0, 0.1 * scale**2]), np.zeros((2, 2)), None, feet)
+        stops = [mp.UnilateralContact(foot, foot, 0.0, restitution=restitution) for foot in ("l", "r")]
+        loads = [mp.ConstantLoad("y", -9.81 * scale)]
+        run = mp.simulate(mp.MultiPhiModel(bar, stops), 1.0, displacement=[height * scale, 0.0], loads=loads)
+        struck = math.sqrt(2 * height / 9.81)
+        if restitution:  # without one they stay on the ground both ways
+            assert struck <= run.horizon() < struck + 0.1
+        tilted = mp.simulate(mp.MultiPhiModel(bar, stops), 0.6, displacement=[height * scale, 1e-3], loads=loads)
+        assert tilted.horizon() == 0.6
+
+    @pytest.mark.parametrize("scale", [1.0, 2.0**-20])
+    def test_a_mass_at_rest_on_a_hill_is_not_determined(self, scale):
+        q = scale * np.array([-1, -0.2, 0, 0.2, 1.0])
+        for slope in (-20.0, -5.0):
+            law = mp.ForceLaw("m", (q, -slope * scale * np.array([-0.4, 0.2, 0.0, -0.2, 0.4])))
+            hill = mp.MultiPhiModel(mp.LinearStructure([[1.0]], [[0.0]], None, {"m": 0}), [law])
+            run, rate = mp.simulate(hill, 40.0), math.sqrt(-slope)
+            assert np.all(run.at("m", np.linspace(0, 40.0, 101)) == 0.0)
+            assert 20 / rate < run.horizon() < 32 / rate
+
+    def test_balls_that_touch_are_not_determined(self):
+        balls = mp.LinearStructure(np.eye(4), np.zeros((4, 4)), None, {f"b{i}": i for i in range(4)})
+        touching = [
+            mp.UnilateralContact(f"c{i}", {f"b{i + 1}": 1.0, f"b{i}": -1.0}, 0.1 * (i == 0), restitution=0.9)
+            for i in range(3)
+        ]
+        run = mp.simulate(mp.MultiPhiModel(balls, touching), 1.0, velocity=[1.0, 0.0, 0.0, 0.0])
+        assert 0.1 <= run.horizon() < 0.2
+
+    def test_of_what_damping_takes_from_the_motion_gaps_tell(self):
+        """A tilt of the start is gone before the bar strikes; one of the stops is not."""
+        feet = {"y": 0, "phi": 1, "l": np.array([1.0, -0.5]), "r": np.array([1.0, 0.5])}
+        bar = mp.LinearStructure(np.diag([1.0, 0.1]), np.diag([0.0, 0.1]), np.diag([0.0, 20.0]), feet)
+        stops = [mp.UnilateralContact(foot, foot, 0.0, restitution=0.5) for foot in ("l", "r")]
+        run = mp.simulate(
+            mp.MultiPhiModel(bar, stops), 0.6, displacement=[0.5, 0.0], loads=[mp.ConstantLoad("y", -9.81)]
+        )
+        assert run.horizon(1e-5) < 0.6
+
+    @pytest.mark.parametrize("given", [{}, {"stiffness": 1e5}, {"restitution": 0.5}])
+    @pytest.mark.parametrize("height", [0.0, 0.1])
+    def test_a_ball_that_falls_or_rests_is_determined(self, given, height):
+        ball = mp.LinearStructure([[1.0]], [[0.0]], None, {"y": 0})
+        model = mp.MultiPhiModel(ball, [mp.UnilateralContact("floor", "y", 0.0, **given)])
+        run = mp.simulate(model, 1.0, displacement=[height], loads=[mp.ConstantLoad("y", -9.81)])
+        assert run.horizon() == 1.0
+
     def test_a_motion_at_rest_has_none(self):
         assert mp.simulate(mp.MultiPhiModel(chain(3), [stop()], modes="all"), 2.0).horizon() == 2.0
 

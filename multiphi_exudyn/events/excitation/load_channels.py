@@ -18,7 +18,7 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
 from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
 from multiphi_exudyn.mechanics.loads.loads import Load, VaryingLoad
-from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion
+from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion, StopsMotion
 from multiphi_exudyn.mechanics.loads.samples import Sampled
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.loads.time_functions import TimeFunction
@@ -47,6 +47,11 @@ class LoadChannels:
             stop = self._no_stop()
             stop[self._model.pressing_links(self._model.index(load.contact))] = 1.0
             self._check_smooth(stop, load.course)
+            self._add_stop_motion(stop, self._history(load.course))
+        elif isinstance(load, StopsMotion):
+            stop = self._no_stop()
+            for name, amount in load.amounts.items():
+                stop[self._model.pressing_links(self._model.index(name))] = amount
             self._add_stop_motion(stop, self._history(load.course))
         elif isinstance(load, BaseMotion):
             self._add_base_motion(load)

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion
+from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion, StopsMotion
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity, StaticLoad
 from multiphi_exudyn.mechanics.loads.time_functions import (
     Harmonic,
@@ -281,4 +281,4 @@ def _unchanging(load: Any) -> bool:
     return isinstance(load, (ConstantLoad, Gravity, HarmonicLoad, SampledLoad, SweepLoad)) and isinstance(point, str)
 
 
-Load: TypeAlias = "StaticLoad | VaryingLoad | StopMotion | BaseMotion"
+Load: TypeAlias = "StaticLoad | VaryingLoad | StopMotion | StopsMotion | BaseMotion"

@@ -8,7 +8,7 @@ relative to it:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,7 @@ from multiphi_exudyn.mechanics.loads.samples import Sampled
 from multiphi_exudyn.mechanics.loads.time_functions import Harmonic, Smooth, Sweep, TimeFunction, check_time_function
 from multiphi_exudyn.mechanics.structures.structure import At
 
-__all__ = ["BaseMotion", "StopMotion"]
+__all__ = ["BaseMotion", "StopMotion", "StopsMotion"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +59,14 @@ class StopMotion:
     def __post_init__(self) -> None:
         check_time_function("stop motion", self.course)
         _check_contacts("stop motion contact", [self.contact], "the name of a contact")
+
+
+@dataclass(frozen=True, eq=False)
+class StopsMotion:
+    """Several contacts whose stops move alike, g_i = h_i.x + gap_i - a_i z(t); amounts: a_i by their names."""
+
+    amounts: Mapping[str, float]
+    course: Harmonic
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,7 @@ from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["ledger_warnings"]
 
+SAMPLES = 257  # of the speed, for its largest value
 ROUND_OFF = 1e-9  # of the largest energy of a run, and of what its loads could give
 REMEDY = (
     "this result is not to be trusted: run it again with a small stiffness where there is none, or a finite one where "
@@ -54,8 +55,10 @@ def _share(energy: float, ledger: Ledger) -> str:
 
 
 def _largest(trajectory: Trajectory) -> float:
-    """Largest energy [J] of a run, or that which its loads could give the structure."""
+    """Largest total and kinetic energy [J] of a run, or that which its loads could give the structure."""
+    speeds = trajectory.model.base.coordinates(trajectory.velocity(np.linspace(trajectory.t_start, trajectory.t_end, SAMPLES)))
+    kinetic = 0.5 * float(np.max(np.sum(speeds**2, axis=0)))
     omega, span = trajectory.model.base.modes.omega, trajectory.t_end - trajectory.start.time
     times = np.minimum(np.divide(1.0, omega, out=np.full(len(omega), span), where=omega > 0), span)
     loads = trajectory.segments.levels[0].excitation.largest_load
-    return max(trajectory.segments.sizes(trajectory.t_end)[1], 0.5 * float(np.sum((loads * times) ** 2)))
+    return max(trajectory.segments.sizes(trajectory.t_end)[1], kinetic, 0.5 * float(np.sum((loads * times) ** 2)))

@@ -68,8 +68,8 @@ PIECE_BYTES = 500  # that it takes there, its segment included
 def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[str, ...]:
     """Warnings of a run, one sentence each; tolerance: the one that decided its modes.
 
-    All warnings but those of the ledger and of truncation are the same for runs of one length in the same levels, and are cached for
-    them, unless friction or the model's own check needs the motion of every run.
+    All warnings but those of the ledger and of truncation are the same for runs of one length in the same levels, and
+    are cached for them, unless friction or the model's own check needs the motion of every run.
     """
     record, model = trajectory.ending.record, trajectory.model
     visited, cache = record.visited, record.arrays.levels.told

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
@@ -34,7 +35,10 @@ from multiphi_exudyn.time.trajectory.saved import save
 __all__ = ["Rerun", "Trajectory"]
 
 PERTURBATION = 1e-12  # of the largest velocity: above round-off, below the accuracy of a start
-Rerun: TypeAlias = "Callable[[np.ndarray, np.ndarray], Trajectory]"
+GAP_CHANGE = 1e-10  # of a gap and of the motion there: above what counts as one instant where stops move
+STILL = 1e-6  # of the smallest gap: a smaller motion is none, and distances are judged by the gap
+SEED = 1  # of the directions of perturbations
+Rerun: TypeAlias = "Callable[[np.ndarray, np.ndarray, Mapping[str, float]], Trajectory]"
 
 
 @dataclass(frozen=True, repr=False)
@@ -70,10 +74,10 @@ class Trajectory(ModelHistories):
         The static load in base coordinates.
     warnings : tuple of str
         What to distrust in this result and what to do about it, one sentence each that begins with its kind and a
-        colon: open ledger, truncated contact, truncated friction, lost energy, truncation, undamped modes, damping ratios, missing
-        modes, linear range, cluster, base, load pieces.
+        colon: open ledger, truncated contact, truncated friction, lost energy, truncation, undamped modes, damping
+        ratios, missing modes, linear range, cluster, base, load pieces.
     again : callable
-        Function that repeats the run from other y, y' (m,), without warnings.
+        Function that repeats the run from other y, y' (m,) and with changed gaps, without warnings.
 
     Examples
     --------
@@ -206,9 +210,11 @@ class Trajectory(ModelHistories):
         """Sensitivity horizon [s]: time until which perturbed runs stay within ``tolerance`` of this one.
 
         Beyond it motions cannot be compared point by point: round-off would change them as much. The perturbations are
-        +-1e-12 of the velocities y' where the run is fastest, added to those at the start; the distance is that of y,
-        in the norm of the mass matrix, relative to the largest |y| of the run. The horizon is t_end where the distance
-        never exceeds the tolerance, and no later than the end of a perturbed run that fails. Costs two more runs.
+        +-1e-12 of the velocities y' where the run is fastest, added to those at the start; as much in a direction that
+        the motion need not have, fixed and random in all coordinates; and +-1e-10 of the gaps and of the motion there.
+        The distance is that of y, in the norm of the mass matrix, relative to the largest |y| of the run, and for one
+        at rest to the smallest gap. The horizon is t_end where the distance never exceeds the tolerance, and no later
+        than the end of a perturbed run that fails. Costs six more runs.
 
         Parameters
         ----------
@@ -241,12 +247,47 @@ class Trajectory(ModelHistories):
             raise NumericalFailure(f"horizon: got a run without motion ({self.message}), need one that has started")
         times = self._comparison_times
         y, speeds = self._coordinates(times), self.model.base.coordinates(self.velocity(times))
-        perturbation = PERTURBATION * speeds[:, int(np.argmax(np.linalg.norm(speeds, axis=0)))]
-        start = self.start
-        runs = [self.again(start.displacement, start.velocity + sign * perturbation) for sign in (1, -1)]
-        limit = tolerance * float(np.max(np.linalg.norm(y, axis=0)))
+        fastest, reach = int(np.argmax(np.linalg.norm(speeds, axis=0))), float(np.max(np.linalg.norm(y, axis=0)))
+        length, start = self._smallest_gap, self.start
+        speed = max(float(np.linalg.norm(speeds[:, fastest])), length / (self.t_end - start.time))
+        along, across = PERTURBATION * speeds[:, fastest], PERTURBATION * speed * self._random_direction
+        runs = [
+            self.again(start.displacement, start.velocity + sign * change, {})
+            for change in (along, across)
+            for sign in (1.0, -1.0)
+        ]
+        for sign in (1.0, -1.0) if (changes := self._random_gap_changes(y)) else ():
+            gaps = {name: sign * change for name, change in changes.items()}
+            runs.append(self.again(start.displacement, start.velocity, gaps))
+        limit = tolerance * (reach if reach > STILL * length else length)
         completed = [run for run in runs if run.status == self.status] or runs
         return min(_first_distance_above(run, times, y, limit) for run in completed)
+
+    @property
+    def _smallest_gap(self) -> float:
+        """Smallest |y| [m sqrt(kg)] that closes a gap which is not closed, zero without one."""
+        base = self.model.base
+        moved = (base.lengths > 0) & (base.gaps != 0)
+        return float(np.min(np.abs(base.gaps[moved]) / base.lengths[moved], initial=math.inf)) if moved.any() else 0.0
+
+    @property
+    def _random_direction(self) -> np.ndarray:
+        """A unit vector y (m,) with a part of every coordinate x_i of the structure, of its size 1 / sqrt(M_ii)."""
+        mass = np.asarray(self.model.structure.mass.diagonal())
+        x = np.random.default_rng(SEED).uniform(-1.0, 1.0, len(mass)) / np.sqrt(mass)
+        y = self.model.base.coordinates(x)
+        return np.asarray(y / np.linalg.norm(y))
+
+    def _random_gap_changes(self, y: np.ndarray) -> dict[str, float]:
+        """Changes [m] of gaps, relative to their sizes and to the motion y (m, k) at the contacts.
+
+        A continued run keeps its gaps: its stops are where they are.
+        """
+        base, names = self.model.base, self.contacts if self.start.state is None else ()
+        places = np.array([self.model.link_indices[self.model.index(name)][0] for name in names], int)
+        sizes = np.max(np.abs(base.directions[:, places].T @ y), axis=1, initial=0.0) + np.abs(base.gaps[places])
+        changes = GAP_CHANGE * sizes * np.random.default_rng(SEED).uniform(-1.0, 1.0, len(names))
+        return {name: change for name, change in zip(names, changes.tolist(), strict=True) if change}
 
     @property
     def _comparison_times(self) -> np.ndarray:
