@@ -614,3 +614,74 @@ class TestOpenLedger:
                 model = mp.MultiPhiModel(bar, [stop(end, 0.0, name=end) for end in "ab"], modes="all")
                 run = mp.simulate(model, 1.0, loads=[mp.ConstantLoad(np.array([share - 1, -share]), scale)])
                 assert run.warnings == ()
+
+
+class TestMeshImpacts:
+    """A clamped bar of unit length, mass and stiffness before a rigid stop, pulled and let go: energy is not lost."""
+
+    PERIOD = 10 / 3
+
+    @staticmethod
+    def bar(elements, tip=0.0):
+        h, n = 1 / elements, elements + 1
+        near = np.eye(n, k=1) + np.eye(n, k=-1)
+        ends = np.diag([1.0, *[2.0] * (n - 2), 1.0])
+        mass, stiffness = h / 6 * (2 * ends + near), (ends - near) / h
+        mass[-1, -1] += tip
+        return mp.LinearStructure(mass[1:, 1:], stiffness[1:, 1:], None, {"tip": elements - 1})
+
+    @staticmethod
+    def exact(x, t):
+        """d'Alembert's: contact from 4/3 to 2, period 10/3."""
+        corners = np.cumsum([0.0, -1.0, 1.0, 1.0, -1.0, -1.0])
+
+        def travelled(s):
+            whole, rest = np.divmod(np.asarray(s) + 1.0, 10 / 3)
+            return whole * corners[-1] + np.interp(rest, 2 / 3 * np.arange(6), corners)
+
+        return travelled(2.0 + t + x) - travelled(2.0 + t - x)
+
+    def run(self, structure, periods, modes="all", start=None, **given):
+        x = np.arange(1, structure.n + 1) / structure.n
+        model = mp.MultiPhiModel(structure, [mp.UnilateralContact("wall", {"tip": -1.0}, 1.0, **given)], modes=modes)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", mp.MultiPhiWarning)
+            run = mp.simulate(model, periods * self.PERIOD, displacement=self.exact(x, 0.0) if start is None else start)
+            many = mp.simulate_many(model, run.t_end, [run.model.base.modes.shapes @ run.start.displacement], threads=1)
+        assert many.warnings[0] == run.warnings
+        t = np.linspace(run.t_end - self.PERIOD, run.t_end, 20)
+        apart = run.displacement(t) - np.array([self.exact(x, time) for time in t]).T
+        return run, math.sqrt(np.max(np.mean(apart**2, axis=0)) / np.mean(self.exact(x, 0.0) ** 2))
+
+    @pytest.mark.parametrize(("elements", "modes", "periods"), [(20, "all", 3), (60, 12, 3), (60, "all", 10), (20, 6, 1)])
+    def test_that_took_what_the_mesh_decides_are_told(self, elements, modes, periods):
+        run, error = self.run(self.bar(elements), periods, modes)
+        (told,) = (sentence for sentence in run.warnings if sentence.startswith("mesh impacts: "))
+        assert f"{100 * run.ledger.impact / run.ledger.initial:.2g} % of the largest energy" in told
+        assert error > 0.05
+
+    @pytest.mark.parametrize(("elements", "periods"), [(60, 1), (120, 1)])
+    def test_of_a_fine_mesh_are_not(self, elements, periods):
+        run, error = self.run(self.bar(elements), periods)
+        assert run.warnings == ()
+        assert error < 0.05
+
+    def test_on_a_compliant_or_elastic_wall_take_nothing(self):
+        for given in ({"stiffness": 1e3}, {"restitution": 1.0}):
+            assert "mesh impacts" not in kinds(self.run(self.bar(20), 3, **given)[0])
+
+    @pytest.mark.parametrize("modes", [6, 20, "all"])
+    def test_of_a_mass_at_the_end_are_its_own(self, modes):
+        run, _ = self.run(self.bar(40, tip=1.0), 3, modes)
+        assert run.ledger.impact > 0.05 * run.ledger.initial
+        assert "mesh impacts" not in kinds(run)
+
+    @pytest.mark.parametrize("masses", [1, 2, 3, 5, 6, 20])
+    def test_of_lumped_masses_are_their_own(self, masses):
+        run, _ = self.run(
+            mp.LinearStructure(np.eye(masses) / masses**2, chain(masses, ends=1).stiffness, None, {"tip": masses - 1}),
+            3,
+            start=np.linspace(-3.0, -4.0, masses),
+        )
+        assert run.ledger.impact > 0.01 * run.ledger.initial
+        assert run.warnings == ()

@@ -10,6 +10,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "backward slip: ..."      truncated friction that moves against its slip (friction_warnings.py)
     "redundant friction: ..." friction whose share of the load, and begin of slip, is not unique (friction_warnings.py)
     "friction in turn: ..."   friction at rigid contacts that is decided in an order (friction_warnings.py)
+    "mesh impacts: ..."       energy that plastic impacts take of a continuum, which the mesh decides (impact_warnings.py)
     "several impacts: ..."    an impact with friction for which Coulomb's law has several solutions (impact_warnings.py)
     "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held, and
                               the energy lost with it
@@ -43,7 +44,7 @@ from multiphi_exudyn.levels.model.mode_choice import Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.time.loop.verdict import lost_share
 from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
-from multiphi_exudyn.time.reliability.impact_warnings import impact_warnings
+from multiphi_exudyn.time.reliability.impact_warnings import impact_warnings, is_taking, mesh_warnings, spread_contacts
 from multiphi_exudyn.time.reliability.ledger_warnings import ledger_warnings
 from multiphi_exudyn.time.reliability.truncation_warnings import energy_warning, truncation_warnings, verdict_of
 from multiphi_exudyn.time.segments.segment import Segments
@@ -85,6 +86,8 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     general, before, after = entry
     if trajectory.ending.numbers[BALANCED] != 1.0 or record.left_out_count:
         before = (*ledger_warnings(trajectory), *before)
+    if general.spread and is_taking(trajectory.ending.numbers):
+        after = (*mesh_warnings(trajectory, general.spread), *after)
     share, error = trajectory.segments.verdict
     if tolerance is not None or not (share >= 0 and error >= 0):
         share, error = verdict_of(trajectory, tolerance)
@@ -98,12 +101,13 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
 class ModelWarnings:
     """Warnings of a model and of the visited levels, which need no motion.
 
-    rigid: whether there is a rigid contact. needs_motion: whether friction, or the model's own check, needs the motion
+    rigid: whether there is a rigid contact. spread: names of those whose effective mass the mesh decides. needs_motion: whether friction, or the model's own check, needs the motion
     of every run. before, clusters: warnings. fastest: highest frequency of the open level [Hz]. slowest: lowest nonzero
     frequency of the levels [rad/s]. ample: a duration [s] in which all modes move.
     """
 
     rigid: bool
+    spread: tuple[str, ...]
     needs_motion: bool
     before: tuple[str, ...]
     clusters: tuple[str, ...]
@@ -127,6 +131,7 @@ class ModelWarnings:
         slowest = float(np.min(omega[omega > 0], initial=math.inf))
         return cls(
             any(contact.rigid for contact in model.contacts),
+            spread_contacts(model),
             model.general or model.validity is not None,
             (*damping_warnings(model), *missing_modes(model), *static),
             tuple(cluster_warnings(levels)),
