@@ -189,3 +189,45 @@ def test_a_contact_that_no_kept_mode_moves_follows_the_static_response():
     assert trajectory.gap("bump", times) == pytest.approx(-pressed / 6e4, rel=1e-9)
     assert trajectory.contact_force("bump", times) == pytest.approx(pressed * 5 / 6, rel=1e-9)
     assert abs(trajectory.ledger.residual) < 1e-15 < trajectory.ledger.work_of_loads
+
+
+class TestToleranceIsKept:
+    """Runs whose indicator is far below their error: many events pass on what each of them loses."""
+
+    END = 0.25
+
+    def error(self, run, whole):
+        """NRMSE over the run, the worse of two points."""
+        t = np.linspace(0, self.END, 800)
+        pairs = [(run.at(point, t), whole.at(point, t)) for point in ("p", "tip")]
+        return max(np.linalg.norm(found - expected) / np.linalg.norm(expected) for found, expected in pairs)
+
+    def beam(self, elements, at, stiffness, damping, gap=0.0, height=0.006):
+        section = mp.Section.rectangle(0.0, 0.5, width=0.03, height=height, youngs_modulus=70e9, density=2700.0)
+        ratios = mp.ModalDamping([0.01, 0.005], beyond=0.005) if damping else mp.ModalDamping(0.002)
+        structure = mp.planar_beam(mp.Beam([section], {"p": at, "tip": 0.5}), elements, damping=ratios)
+        return structure, [mp.UnilateralContact("c", "p", gap, stiffness, damping)]
+
+    @pytest.mark.parametrize("error", [0.02, 0.05])
+    @pytest.mark.parametrize(
+        ("elements", "at", "stiffness", "damping", "pull", "frequency"),
+        [
+            (13, 0.349038, np.inf, 0.0, 0.0, 42.37462),
+            (20, 0.413784, 7655639.5, 276.69, -20.0, 0.0),
+            (18, 0.3, 1e6, 0.0, -20.0, 0.0),
+            (16, 0.25, 5e6, 5.0, 0.0, 30.0),
+        ],
+    )
+    def test_or_told(self, elements, at, stiffness, damping, pull, frequency, error):
+        structure, contacts = self.beam(elements, at, stiffness, damping)
+        whole, chosen = (mp.MultiPhiModel(structure, contacts, modes=m) for m in ("all", mp.Tolerance(error)))
+        start = whole.static_equilibrium({"tip": pull}) if pull else None
+        loads = [mp.HarmonicLoad("tip", 10.0, frequency)] if frequency else []
+        expected, run, again = (mp.simulate(m, self.END, start, loads=loads) for m in (whole, chosen, chosen))
+        assert self.error(run, expected) <= error
+        assert again.warnings == run.warnings
+        few = mp.MultiPhiModel(structure, contacts, modes=mp.Tolerance(error, most=10))
+        cut = mp.simulate(few, self.END, start, loads=loads)
+        assert self.error(cut, expected) <= error or any(text.startswith("truncation: ") for text in cut.warnings)
+        again = mp.simulate(few, self.END, start, loads=loads)
+        assert [text.split(":")[0] for text in again.warnings] == [text.split(":")[0] for text in cut.warnings]

@@ -91,7 +91,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     share, error = trajectory.segments.verdict
     if tolerance is not None or not (share >= 0 and error >= 0):
         share, error = verdict_of(trajectory, tolerance)
-    if not (share > 0 or error > 0):
+    if tolerance is None and not (share > 0 or error > 0):
         return before + after
     struck = general.rigid and error > 0 and _struck(trajectory)
     return before + truncation_warnings(model, (share, error), tolerance, struck) + after

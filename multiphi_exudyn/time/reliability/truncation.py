@@ -7,10 +7,15 @@ The indicator adds the defects of a run (defects.py) like independent errors and
 The mean is that of a polygon through 25 instants evenly spaced: the indicator is known to some per cent of itself. It
 predicts an error, it does not bound it: it does not include how fast neighbouring motions separate, and motion that one
 level contains and the next one drops has little weight in it (keep the levels' highest frequencies near each other).
+
+A Tolerance is therefore not decided by the indicator alone: the run is repeated with twice as many modes, and holds if
+both differ by less than the tolerance / SAFETY, in |y| and at every point of the structure. Where the largest number of
+modes is reached before, the last difference is told.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -21,10 +26,15 @@ from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.model.mode_choice import TRIED, Tolerance, UpTo
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.time.reliability.defects import DefectHistory
+from multiphi_exudyn.time.reliability.truncation_warnings import CHANGE
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["run_with_enough_modes", "truncation_indicator"]
 
+APART = 1.5  # times as many modes has a run by which another one is judged
+SAFETY = 2.0  # of the difference to a run with twice as many modes: the error of the coarser one is larger by its own
+INSTANTS = 400  # at which two runs are compared
+UNMOVED = 1e-3  # of what a point could move by |y|: a smaller motion there is not compared
 FEWEST = 3  # modes of the open level in the first run
 GROWTH = 0.25  # of its modes are added each time, at least one
 ABOVE = 1 + 1e-9  # of its last mode's frequency: the cut-off that keeps this mode
@@ -78,27 +88,72 @@ def run_with_enough_modes(model: MultiPhiModel, run: Callable[[MultiPhiModel], T
     """Repeat ``run`` with more modes until the Tolerance of the model is met; ``Trajectory.model`` has these modes.
 
     The open level begins with the modes that contain the static flexibility of every contact, and is given more until
-    the indicator is below the tolerance; every other level has its modes up to the same frequency. The last try is all
-    modes of the structure, unless the tolerance allows fewer. The base, at first of TRIED modes, is doubled when more
-    are needed.
+    the indicator is below the tolerance and a run with twice as many differs by less; every other level has its modes
+    up to the same frequency. The last try is all modes of the structure, unless the tolerance allows fewer: then the
+    model keeps the change from half as many, if that is more than the tolerance. The base, at first of TRIED modes, is
+    doubled when more are needed.
     """
     tolerance = model.modes
     assert isinstance(tolerance, Tolerance), "the caller has checked it"
     most = min(tolerance.most, model.structure.n)
-    source = replace(model, modes=most if model.base.complete else min(most, TRIED))
-    level = source.level(())
-    rigid = int(np.sum(level.omega == 0))
-    count = max(_modes_for_flexibility(level, tolerance.error), min(rigid + 1, most))
+    attempts = _Attempts(replace(model, modes=most if model.base.complete else min(most, TRIED)), most, run)
+    level, finer, finer_count = attempts.level, None, 0
+    count = max(_modes_for_flexibility(level, tolerance.error), min(int(np.sum(level.omega == 0)) + 1, most))
     while True:
-        if count > level.modes and level.modes < most:
-            source = replace(source, modes=min(most, 2 * level.modes))
-            level = source.level(())
-        count = min(count, level.modes)
-        trajectory = run(replace(source, modes=_mode_choice(level, count)))
-        enough = trajectory.status != "ok" or truncation_indicator(trajectory) <= tolerance.error
-        if enough or count == most:
+        trajectory, count = attempts.run(count)
+        if trajectory.status != "ok" or trajectory.model.modes == "all":
             return trajectory
-        count += max(1, round(GROWTH * count))
+        if truncation_indicator(trajectory) <= tolerance.error:
+            if finer is None or finer_count < APART * count:
+                finer, finer_count = attempts.run(2 * count if count < most else count // 2)
+            change = _change(trajectory, finer)
+            if change <= tolerance.error / SAFETY and (finer_count >= APART * count or finer.model.modes == "all"):
+                return trajectory
+            if count == most or finer.status != "ok":
+                if change > tolerance.error:
+                    trajectory.model.entries.keep(CHANGE, change)
+                return trajectory
+        if count == most:
+            return trajectory
+        count = min(most, count + max(1, round(GROWTH * count)))
+
+
+class _Attempts:
+    """Runs with numbers of modes; level: the open one of a model with at least so many."""
+
+    def __init__(self, source: MultiPhiModel, most: int, run: Callable[[MultiPhiModel], Trajectory]) -> None:
+        self._source, self._most, self._run = source, most, run
+        self.level = source.level(())
+
+    def run(self, count: int) -> tuple[Trajectory, int]:
+        """Trajectory with ``count`` modes, or as many as there may be, and their number."""
+        count = max(1, min(count, self._most))
+        while count > self.level.modes < self._most:
+            modes = self.level.modes
+            self._source = replace(self._source, modes=min(self._most, 2 * modes))
+            self.level = self._source.level(())
+            if self.level.modes <= modes:
+                break
+        count = min(count, self.level.modes)
+        return self._run(replace(self._source, modes=_mode_choice(self.level, count))), count
+
+
+def _change(coarser: Trajectory, finer: Trajectory) -> float:
+    """Largest relative difference of two runs, as root mean squares over time: of |y|, and at points that move."""
+    if finer.status != "ok":
+        return math.inf
+    times = np.linspace(coarser.t_start, coarser.t_end, INSTANTS)
+    x, difference = finer.displacement(times), coarser.displacement(times)
+    difference -= x
+    base, rows = finer.model.base, np.array([finer.model.structure.row(name) for name in finer.points])
+    y, apart = base.coordinates(x), base.coordinates(difference)
+    whole, largest = float(np.linalg.norm(y)), float(np.linalg.norm(apart))
+    change = largest / whole if whole > 0 else 0.0
+    for row in rows:
+        moved, reach = float(np.linalg.norm(row @ x)), float(np.linalg.norm(base.modes.shapes.T @ row))
+        if moved > UNMOVED * reach * whole:
+            change = max(change, float(np.linalg.norm(row @ difference)) / moved)
+    return change
 
 
 def _mode_choice(level: Level, count: int) -> str | int | UpTo:

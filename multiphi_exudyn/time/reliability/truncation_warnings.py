@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 
 import numpy as np
 
@@ -16,8 +17,9 @@ from multiphi_exudyn.time.reliability.defects import total_defect
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from multiphi_exudyn.time.warnings.model_warnings import REMEDY
 
-__all__ = ["energy_warning", "indicator_threshold", "truncation_warnings", "verdict_of"]
+__all__ = ["CHANGE", "energy_warning", "indicator_threshold", "truncation_warnings", "verdict_of"]
 
+CHANGE = "change"  # entry of a model: the last change by more modes, where it exceeds what a Tolerance allows
 TEXTS = 64  # verdicts whose sentences are kept
 RIGID_INDICATOR = 0.05  # threshold where a rigid contact is struck: impacts raise the indicator more than the error
 
@@ -52,8 +54,15 @@ def truncation_warnings(
 ) -> tuple[str, ...]:
     """One warning of motion and energy lost to truncation, or none; struck: whether a rigid contact was struck."""
     share, error = verdict
+    kept = model.level_at(()).modes if tolerance is not None else 0
+    change = None if tolerance is None else model.entries.find(CHANGE)
+    if change is not None:
+        found = f"differs by {per_cent(change)} from" if math.isfinite(change) else "could not be compared with"
+        return (
+            f"truncation: with {kept} modes the run that decided them {found} one with another number of modes, the "
+            f"tolerance is {tolerance.error:g}{_also_lost(share)}; give Tolerance a larger most=, or a shorter run",
+        )
     if tolerance is not None and error > tolerance.error:
-        kept = model.level_at(()).modes
         return (
             f"truncation: the indicator is {error:.2g} with {kept} modes, the tolerance {tolerance.error:g}"
             f"{_also_lost(share)}; give Tolerance a larger most=, or a new model, so that it decides by this run",
