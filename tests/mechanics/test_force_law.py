@@ -1,10 +1,12 @@
 """Force laws: segments of second order, chains of levels that follow the true law, energy that is kept."""
 
 import math
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.integrate
 from numpy.testing import assert_allclose
 from small_structures import chain
 from true_law import force_of_links, with_forces
@@ -440,3 +442,68 @@ class TestEquilibrium:
         strong = model(law(lambda q: -0.5 / (2 - q) ** 2, segments=200, span=(-1.9, 1.9)))
         with pytest.raises(mp.NumericalFailure, match="the structure snaps through"):
             strong.static_equilibrium({})
+
+
+class TestWhatAToleranceDoesToAMotion:
+    """An error of the force shifts the frequency: judged by the law itself."""
+
+    LAWS = {
+        "cubic": lambda q: q**3,
+        "Hertz": lambda q: 2.0 * np.maximum(q, 0.0) ** 1.5,
+        "magnets": lambda q: q + 0.15 * (1 / (2.6 + q) ** 2 - 1 / (2.6 - q) ** 2),
+        "softening": lambda q: np.tanh(q),
+    }
+
+    def run(self, law, speed, periods, unit=1.0, damping=1e-3):
+        k = np.array([[2.0, -1.0], [-1.0, 1.0]])
+        structure = mp.LinearStructure(np.eye(2), k, damping * k, {"a": 0, "b": 1})
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", mp.MultiPhiWarning)
+            return mp.simulate(
+                mp.MultiPhiModel(structure, [law], modes="all"), 2 * math.pi * periods, velocity=[0.0, speed * unit]
+            )
+
+    def exact(self, kind, speed, t, damping=1e-3):
+        k = np.array([[2.0, -1.0], [-1.0, 1.0]])
+
+        def rates(_, z):
+            return np.r_[z[2:], -k @ z[:2] - damping * k @ z[2:] - [0.0, self.LAWS[kind](z[1])]]
+
+        answer = scipy.integrate.solve_ivp(
+            rates, (0, t[-1]), [0, 0, 0, speed], "DOP853", t_eval=t, rtol=1e-8, atol=1e-10
+        )
+        return answer.y[:2]
+
+    @pytest.mark.parametrize("kind", LAWS)
+    @pytest.mark.parametrize("tolerance", [2e-2, 2e-3, 2e-4])
+    @pytest.mark.parametrize(("speed", "periods"), [(0.2, 8.0), (1.0, 20.0)])
+    def test_is_told_where_it_is_wrong_and_not_where_it_is_right(self, kind, tolerance, speed, periods):
+        def of(accuracy):
+            return mp.ForceLaw("b", self.LAWS[kind], tolerance=accuracy, span=(-2.0, 2.0))
+
+        run = self.run(of(tolerance), speed, periods)
+        t = np.linspace(0.0, run.t_end, 1001)
+        expected = self.exact(kind, speed, t)
+        error = np.linalg.norm(run.displacement(t) - expected) / np.linalg.norm(expected)
+        told = [text for text in run.warnings if text.startswith("force law: ")]
+        assert len(told) >= (error > 0.05)
+        assert len(told) <= (error > 0.004)
+        if told and tolerance == 2e-2 and speed == 1.0:
+            finer = self.run(of(float(told[0].split("tolerance=")[1])), speed, periods)
+            assert finer.warnings == ()
+            rest = np.linalg.norm(finer.displacement(t) - expected) / np.linalg.norm(expected)
+            assert rest < 0.02
+
+    def test_is_nothing_of_a_table_or_where_nothing_moves(self):
+        table = mp.ForceLaw("b", (np.array([-1.0, 0.0, 0.3, 1.0]), np.array([-1.0, 0.0, 0.1, 2.0])))
+        assert self.run(table, 0.5, 20.0).warnings == ()
+        coarse = mp.ForceLaw("b", lambda q: q**3, tolerance=0.1, span=(-2.0, 2.0))
+        assert self.run(coarse, 0.0, 2.0).warnings == ()
+
+    def test_is_told_of_many_runs_as_of_one(self):
+        law = mp.ForceLaw("b", lambda q: q**3, tolerance=1e-2, span=(-2.0, 2.0))
+        run = self.run(law, 0.5, 20.0)
+        with pytest.warns(mp.MultiPhiWarning, match="force law"):
+            many = mp.simulate_many(run.model, run.t_end, velocities=[[0.0, 0.4], [0.0, 0.5]], threads=1)
+        assert many.warnings[1] == run.warnings
+        assert len(run.warnings) == 1

@@ -653,7 +653,9 @@ class TestMeshImpacts:
         apart = run.displacement(t) - np.array([self.exact(x, time) for time in t]).T
         return run, math.sqrt(np.max(np.mean(apart**2, axis=0)) / np.mean(self.exact(x, 0.0) ** 2))
 
-    @pytest.mark.parametrize(("elements", "modes", "periods"), [(20, "all", 3), (60, 12, 3), (60, "all", 10), (20, 6, 1)])
+    @pytest.mark.parametrize(
+        ("elements", "modes", "periods"), [(20, "all", 3), (60, 12, 3), (60, "all", 10), (20, 6, 1)]
+    )
     def test_that_took_what_the_mesh_decides_are_told(self, elements, modes, periods):
         run, error = self.run(self.bar(elements), periods, modes)
         (told,) = (sentence for sentence in run.warnings if sentence.startswith("mesh impacts: "))

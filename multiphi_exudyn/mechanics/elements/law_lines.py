@@ -64,11 +64,11 @@ class LawLines:
         low, high = self._checked_span()
         accuracy = self._checked_accuracy()
         q = np.linspace(low, high, SAMPLES + 1)
-        centre = _centre(q, self._sampled(q))
+        centre = _centre(q, self.sampled(q))
         sides = [
             q for q in (np.linspace(low, centre, SAMPLES + 1), np.linspace(centre, high, SAMPLES + 1)) if q[-1] > q[0]
         ]
-        values = [self._sampled(side) for side in sides]
+        values = [self.sampled(side) for side in sides]
         largest = max(float(np.max(np.abs(value))) for value in values)
         if isinstance(accuracy, int):
             chosen = with_segments(sides, values, max(accuracy, len(sides)), 2 * largest)
@@ -77,7 +77,7 @@ class LawLines:
         knots = np.concatenate([side[index[first:]] for first, (side, index) in _numbered(sides, chosen)])
         forces = np.concatenate([value[index[first:]] for first, (value, index) in _numbered(values, chosen)])
         between = np.concatenate([(side[1:] + side[:-1]) / 2 for side in sides])
-        error = np.max(np.abs(self._sampled(between) - np.interp(between, knots, forces)))
+        error = np.max(np.abs(self.sampled(between) - np.interp(between, knots, forces)))
         return knots, forces, centre, float(error / largest) if largest else 0.0
 
     def _within(self, sides: list[np.ndarray], values: list[np.ndarray], error: float) -> list[np.ndarray]:
@@ -115,7 +115,7 @@ class LawLines:
             raise MultiPhiValueError(f"{self.label} segments: got {self.segments!r}, need 2 to {MOST_SEGMENTS}")
         return int(self.segments)
 
-    def _sampled(self, q: np.ndarray) -> np.ndarray:
+    def sampled(self, q: np.ndarray) -> np.ndarray:
         """F (k,) [N] at q (k,) [m], from a function of arrays or of numbers."""
         assert callable(self.law), "a table has no samples"
         try:

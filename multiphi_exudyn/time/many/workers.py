@@ -21,6 +21,7 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.time.many.batch import Batch
 from multiphi_exudyn.time.reliability.impact_warnings import is_taking, spread_contacts
+from multiphi_exudyn.time.reliability.law_warnings import approximated_laws
 from multiphi_exudyn.time.reliability.run_warnings import ModelWarnings
 from multiphi_exudyn.time.reliability.truncation_warnings import indicator_threshold, truncation_warnings
 from multiphi_exudyn.time.run.motion import Motion, carry
@@ -128,6 +129,7 @@ class Task:
         """Warnings of the runs of a batch; a run whose numbers do not suffice is made into a trajectory."""
         model, runs = batch.arrays.levels.model, range(batch.count)
         needs_trajectory = model.general or model.validity is not None or not model.base.complete
+        needs_trajectory = needs_trajectory or bool(approximated_laws(model))
         spread = spread_contacts(model)
         separate = [
             k

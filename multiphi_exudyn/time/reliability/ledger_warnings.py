@@ -54,9 +54,12 @@ def _share(energy: float, ledger: Ledger) -> str:
     return f"{per_cent(abs(energy) / ledger.turned_over)} of the energies turned over"
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of a run that grew without end
 def _largest(trajectory: Trajectory) -> float:
     """Largest total and kinetic energy [J] of a run, or that which its loads could give the structure."""
-    speeds = trajectory.model.base.coordinates(trajectory.velocity(np.linspace(trajectory.t_start, trajectory.t_end, SAMPLES)))
+    speeds = trajectory.model.base.coordinates(
+        trajectory.velocity(np.linspace(trajectory.t_start, trajectory.t_end, SAMPLES))
+    )
     kinetic = 0.5 * float(np.max(np.sum(speeds**2, axis=0)))
     omega, span = trajectory.model.base.modes.omega, trajectory.t_end - trajectory.start.time
     times = np.minimum(np.divide(1.0, omega, out=np.full(len(omega), span), where=omega > 0), span)

@@ -10,6 +10,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "backward slip: ..."      truncated friction that moves against its slip (friction_warnings.py)
     "redundant friction: ..." friction whose share of the load, and begin of slip, is not unique (friction_warnings.py)
     "friction in turn: ..."   friction at rigid contacts that is decided in an order (friction_warnings.py)
+    "force law: ..."          what the segments of a force law may do to the motion (law_warnings.py)
     "mesh impacts: ..."       energy that plastic impacts take of a continuum, which the mesh decides (impact_warnings.py)
     "several impacts: ..."    an impact with friction for which Coulomb's law has several solutions (impact_warnings.py)
     "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held, and
@@ -45,6 +46,7 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.time.loop.verdict import lost_share
 from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
 from multiphi_exudyn.time.reliability.impact_warnings import impact_warnings, is_taking, mesh_warnings, spread_contacts
+from multiphi_exudyn.time.reliability.law_warnings import approximated_laws, law_warnings
 from multiphi_exudyn.time.reliability.ledger_warnings import ledger_warnings
 from multiphi_exudyn.time.reliability.truncation_warnings import energy_warning, truncation_warnings, verdict_of
 from multiphi_exudyn.time.segments.segment import Segments
@@ -101,8 +103,8 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
 class ModelWarnings:
     """Warnings of a model and of the visited levels, which need no motion.
 
-    rigid: whether there is a rigid contact. spread: names of those whose effective mass the mesh decides. needs_motion: whether friction, or the model's own check, needs the motion
-    of every run. before, clusters: warnings. fastest: highest frequency of the open level [Hz]. slowest: lowest nonzero
+    rigid: whether there is a rigid contact. spread: names of those whose effective mass the mesh decides. needs_motion:
+    whether friction, a force law, or the model's own check, needs the motion of every run. before, clusters: warnings. fastest: highest frequency of the open level [Hz]. slowest: lowest nonzero
     frequency of the levels [rad/s]. ample: a duration [s] in which all modes move.
     """
 
@@ -132,7 +134,7 @@ class ModelWarnings:
         return cls(
             any(contact.rigid for contact in model.contacts),
             spread_contacts(model),
-            model.general or model.validity is not None,
+            model.general or model.validity is not None or bool(approximated_laws(model)),
             (*damping_warnings(model), *missing_modes(model), *static),
             tuple(cluster_warnings(levels)),
             fastest,
@@ -161,6 +163,8 @@ class ModelWarnings:
         if model.validity is not None:
             yield from model.validity(trajectory)
         yield from _slow_mode(trajectory, self.slowest)
+        if self.needs_motion:
+            yield from law_warnings(trajectory)
         if model.general:
             yield from friction_warnings(trajectory.segments, model)
             yield from impact_warnings(trajectory)
