@@ -3,6 +3,7 @@
 import math
 import warnings
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -447,7 +448,7 @@ class TestEquilibrium:
 class TestWhatAToleranceDoesToAMotion:
     """An error of the force shifts the frequency: judged by the law itself."""
 
-    LAWS = {
+    LAWS: ClassVar = {
         "cubic": lambda q: q**3,
         "Hertz": lambda q: 2.0 * np.maximum(q, 0.0) ** 1.5,
         "magnets": lambda q: q + 0.15 * (1 / (2.6 + q) ** 2 - 1 / (2.6 - q) ** 2),

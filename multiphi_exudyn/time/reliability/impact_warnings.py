@@ -3,8 +3,9 @@
 A rigid contact that is struck stops the effective mass m_e = 1 / sum over modes of (h.phi)^2, which loses
 (1 - e^2) m_e s^2 / 2. On a lumped mass the first modes give nearly all of the sum. On a continuum it grows with every
 mode, m_e and the loss are those of the mesh, and neither is one of the structure itself. Where the upper half of the
-kept modes has more than SPREAD of the sum, and the impacts have taken more than TAKEN of the energy, the run says so: on
-an exact bar (tests/time/test_reliability.py) displacements are then off by 4 %, from 2 % by a quarter.
+kept modes has more than SPREAD of the sum, and the impacts have taken more than TAKEN of the energy, the run says so:
+on an exact bar of 20 to 200 elements and 6 to all modes, over 1 to 10 periods, every run that was off by more than 5 %
+was told, and none that was off by less than 1.5 %.
 
 Impacts for which Coulomb's law has several solutions (coulomb_impacts.py); the run takes one.
 

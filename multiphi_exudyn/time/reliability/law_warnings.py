@@ -1,8 +1,8 @@
 """Law warnings: what the straight segments of a force law do to the motion of a run.
 
 A law is known to a share of its largest force on the span. Its motion is not known to that share: e = F - segments has
-mostly one sign at one amplitude, so it changes the frequency, and the phase drifts for the whole run. For an oscillation
-the balance of the first harmonic gives
+mostly one sign at one amplitude, so it changes the frequency, and the phase drifts for the whole run. For an
+oscillation the balance of the first harmonic gives
 
     d omega / omega = <e q> / (2 <F q>) = <e q> / (4 <kinetic energy>),   omega^2 = <q'^2> / <q^2>
 
@@ -42,7 +42,8 @@ def law_warnings(trajectory: Trajectory) -> Iterator[str]:
         error, name, law = worst
         yield (
             f"force law: {name!r} is approximated to {per_cent(law.error)} of its largest force on its span, which may "
-            f"move this run by {per_cent(min(error, 1.0))} of its motion; give it tolerance={law.error * AIM / error:.1g}"
+            f"move this run by {per_cent(min(error, 1.0))} of its motion; give it "
+            f"tolerance={law.error * AIM / error:.1g}"
         )
 
 

@@ -11,7 +11,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "redundant friction: ..." friction whose share of the load, and begin of slip, is not unique (friction_warnings.py)
     "friction in turn: ..."   friction at rigid contacts that is decided in an order (friction_warnings.py)
     "force law: ..."          what the segments of a force law may do to the motion (law_warnings.py)
-    "mesh impacts: ..."       energy that plastic impacts take of a continuum, which the mesh decides (impact_warnings.py)
+    "mesh impacts: ..."       energy that impacts take of a continuum, which the mesh decides (impact_warnings.py)
     "several impacts: ..."    an impact with friction for which Coulomb's law has several solutions (impact_warnings.py)
     "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held, and
                               the energy lost with it
@@ -104,8 +104,9 @@ class ModelWarnings:
     """Warnings of a model and of the visited levels, which need no motion.
 
     rigid: whether there is a rigid contact. spread: names of those whose effective mass the mesh decides. needs_motion:
-    whether friction, a force law, or the model's own check, needs the motion of every run. before, clusters: warnings. fastest: highest frequency of the open level [Hz]. slowest: lowest nonzero
-    frequency of the levels [rad/s]. ample: a duration [s] in which all modes move.
+    whether friction, a force law, or the model's own check, needs the motion of every run. before, clusters: warnings.
+    fastest: highest frequency of the open level [Hz]. slowest: lowest nonzero frequency of the levels [rad/s]. ample: a
+    duration [s] in which all modes move.
     """
 
     rigid: bool

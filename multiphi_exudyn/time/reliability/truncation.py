@@ -9,8 +9,9 @@ predicts an error, it does not bound it: it does not include how fast neighbouri
 level contains and the next one drops has little weight in it (keep the levels' highest frequencies near each other).
 
 A Tolerance is therefore not decided by the indicator alone: the run is repeated with twice as many modes, and holds if
-both differ by less than the tolerance / SAFETY, in |y| and at every point of the structure. Where the largest number of
-modes is reached before, the last difference is told.
+both differ by less than the tolerance / SAFETY, in |y| and at every point of the structure, and so does a run with four
+times as many: which contact strikes first may hang on a mode that both of two runs lack. Where the largest number of
+modes is reached before, the difference to half of it is told.
 """
 
 from __future__ import annotations
@@ -88,30 +89,28 @@ def run_with_enough_modes(model: MultiPhiModel, run: Callable[[MultiPhiModel], T
     """Repeat ``run`` with more modes until the Tolerance of the model is met; ``Trajectory.model`` has these modes.
 
     The open level begins with the modes that contain the static flexibility of every contact, and is given more until
-    the indicator is below the tolerance and a run with twice as many differs by less; every other level has its modes
-    up to the same frequency. The last try is all modes of the structure, unless the tolerance allows fewer: then the
-    model keeps the change from half as many, if that is more than the tolerance. The base, at first of TRIED modes, is
-    doubled when more are needed.
+    the indicator is below the tolerance and runs with two and four times as many differ by less; every other level has
+    its modes up to the same frequency. The last try is all modes of the structure, unless the tolerance allows fewer:
+    then the model keeps the change from half as many, if that is more than the tolerance. The base, at first of TRIED
+    modes, is doubled when more are needed.
     """
     tolerance = model.modes
     assert isinstance(tolerance, Tolerance), "the caller has checked it"
     most = min(tolerance.most, model.structure.n)
     attempts = _Attempts(replace(model, modes=most if model.base.complete else min(most, TRIED)), most, run)
-    level, finer, finer_count = attempts.level, None, 0
+    level = attempts.level
     count = max(_modes_for_flexibility(level, tolerance.error), min(int(np.sum(level.omega == 0)) + 1, most))
     while True:
-        trajectory, count = attempts.run(count)
+        count, trajectory = attempts.run(count)
         if trajectory.status != "ok" or trajectory.model.modes == "all":
             return trajectory
         if truncation_indicator(trajectory) <= tolerance.error:
-            if finer is None or finer_count < APART * count:
-                finer, finer_count = attempts.run(2 * count if count < most else count // 2)
-            change = _change(trajectory, finer)
-            if change <= tolerance.error / SAFETY and (finer_count >= APART * count or finer.model.modes == "all"):
+            changes = [_change(trajectory, other) for other in attempts.judges(count)]
+            if count < most and changes and max(changes) <= tolerance.error / SAFETY:
                 return trajectory
-            if count == most or finer.status != "ok":
-                if change > tolerance.error:
-                    trajectory.model.entries.keep(CHANGE, change)
+            if (count == most or math.inf in changes) and max(changes) > tolerance.error:
+                trajectory.model.entries.keep(CHANGE, max(changes))
+            if math.inf in changes:
                 return trajectory
         if count == most:
             return trajectory
@@ -119,14 +118,14 @@ def run_with_enough_modes(model: MultiPhiModel, run: Callable[[MultiPhiModel], T
 
 
 class _Attempts:
-    """Runs with numbers of modes; level: the open one of a model with at least so many."""
+    """Runs with numbers of modes up to ``most``; level: the open one of a model with at least so many."""
 
     def __init__(self, source: MultiPhiModel, most: int, run: Callable[[MultiPhiModel], Trajectory]) -> None:
         self._source, self._most, self._run = source, most, run
-        self.level = source.level(())
+        self.level, self._runs = source.level(()), dict[int, Trajectory]()
 
-    def run(self, count: int) -> tuple[Trajectory, int]:
-        """Trajectory with ``count`` modes, or as many as there may be, and their number."""
+    def run(self, count: int) -> tuple[int, Trajectory]:
+        """Trajectory with ``count`` modes, or as many as there may be, and their number before it."""
         count = max(1, min(count, self._most))
         while count > self.level.modes < self._most:
             modes = self.level.modes
@@ -135,7 +134,24 @@ class _Attempts:
             if self.level.modes <= modes:
                 break
         count = min(count, self.level.modes)
-        return self._run(replace(self._source, modes=_mode_choice(self.level, count))), count
+        if count not in self._runs:
+            self._runs[count] = self._run(replace(self._source, modes=_mode_choice(self.level, count)))
+        return count, self._runs[count]
+
+    def judges(self, count: int) -> list[Trajectory]:
+        """Runs by which one of ``count`` modes is judged: with twice and four times as many, and all at the most.
+
+        With half as many, where there may not be more; none where there are too few more.
+        """
+        if count == self._most:
+            return [self.run(count // 2)[1]]
+        found = dict[int, Trajectory]()
+        for factor in (2, 4):
+            known = [other for other in self._runs if other >= min(self._most, APART * factor / 2 * count)]
+            other, trajectory = self.run(min(known, default=factor * count))
+            if other >= APART * count or trajectory.model.modes == "all":
+                found[other] = trajectory
+        return list(found.values())
 
 
 def _change(coarser: Trajectory, finer: Trajectory) -> float:
