@@ -45,6 +45,7 @@ from multiphi_exudyn.time.reliability.truncation_warnings import energy_warning,
 from multiphi_exudyn.time.segments.segment import Segments
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from multiphi_exudyn.time.warnings.model_warnings import (
+    advised,
     cluster_warnings,
     damping_warnings,
     missing_modes,
@@ -83,9 +84,9 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     if tolerance is not None or not (share >= 0 and error >= 0):
         share, error = verdict_of(trajectory, tolerance)
     if not (share > 0 or error > 0):
-        return before + after
+        return advised((*before, *after), tolerance)
     struck = general.rigid and error > 0 and _struck(trajectory)
-    return before + truncation_warnings(model, (share, error), tolerance, struck) + after
+    return advised((*before, *truncation_warnings(model, (share, error), tolerance, struck), *after), tolerance)
 
 
 @dataclass(frozen=True)
