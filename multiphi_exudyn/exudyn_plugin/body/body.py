@@ -192,7 +192,7 @@ class MultiPhiBody:
         truncated = 0.0 if self._run_ahead is None else self._run_ahead.update_record()
         loss = total_loss(() if self._stepwise_run is None else self._stepwise_run.events)
         interface = self.coordinates.interface
-        rotations = () if interface is None else interface.warnings
+        rotations = () if interface is None else interface.warnings(self.model.base.modes.rigid > 0)
         summary = self._record.summary(total_loss(self._events) + loss, truncated)
         return (*warnings_of_body(self.model, summary), *self._base_warnings, *rotations)
 
