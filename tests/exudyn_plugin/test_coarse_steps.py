@@ -1,10 +1,16 @@
-"""Steps that are long for a body's own modes: its events beside heavy parts."""
+"""Steps that are long for a body's own modes: its events beside heavy parts, and what is told."""
+
+import functools
+import math
+import re
+import warnings
 
 import exudyn as exu
 import numpy as np
 import pytest
 from exudyn.itemInterface import (
     CoordinateSpringDamper,
+    LoadCoordinate,
     Mass1D,
     Node1D,
     NodeGenericData,
@@ -76,3 +82,88 @@ def test_beside_a_heavy_part_an_event_of_the_body_errs_no_more_than_a_contact_of
             exact = native.at("0", np.minimum(time, END))
             errors.append(np.linalg.norm(y - exact) / np.linalg.norm(exact))
         assert errors[0] < 1.5 * errors[1]
+
+
+# ---------------------------------------------------------------------- what is told
+
+
+@functools.cache
+def cantilever(modes):
+    """The cantilever of the examples above its stop, pulled up, and its run under a force at the tip."""
+    piece = mp.Section.rectangle(0.0, 0.5, width=0.03, height=0.006, youngs_modulus=70e9, density=2700.0)
+    beam = mp.Beam([piece], points={"middle": 0.375, "tip": 0.5})
+    structure = mp.planar_beam(beam, elements=20, damping=mp.ModalDamping([0.01, 0.005], beyond=0.005))
+    model = mp.MultiPhiModel(structure, [mp.UnilateralContact("stop", "middle", 1.35e-3, 1e6)], modes=modes)
+    start = model.static_equilibrium({"tip": 20.0})
+    return model, start, mp.simulate(model, 0.1, displacement=start, loads=[mp.ConstantLoad("tip", -1.0)])
+
+
+def pushed(model, start, end, steps, force=-1.0, **given):
+    """Histories of a body with a force at its tip, and what the run warns of."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    items = CreateMultiPhiBody(mbs, model, "beam", displacement=start, interface=["tip"], **given)
+    mbs.AddLoad(LoadCoordinate(markerNumber=coordinate(mbs, items["nInterface"]["tip"]), load=force))
+    mbs.Assemble()
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always", mp.MultiPhiWarning)
+        mbs.SolveDynamic(fixed_steps(end, steps, write_period=end / 400), solverType=TRAPEZOIDAL)
+    return body_histories(mbs, items), [str(each.message) for each in seen if "coarse steps" in str(each.message)]
+
+
+def distance(found, native):
+    exact = native.at("tip", np.minimum(found.time, native.t_end))
+    return np.linalg.norm(found.points["tip"] - exact) / np.linalg.norm(exact)
+
+
+@pytest.mark.parametrize(("modes", "steps"), [(12, 400), (12, 1600), (6, 400), (6, 1600)])
+def test_steps_that_are_long_for_the_kept_modes_are_told_and_both_remedies_hold(modes, steps):
+    model, start, native = cantilever(modes)
+    found, (sentence,) = pushed(model, start, 0.1, steps)
+    assert distance(found, native) > 0.03
+    period = 1 / max(model.level(closed).highest_frequency for closed in ((), ("stop",)))
+    step = 0.1 / steps
+    assert f"coarse steps: {period / step:.3g} steps of {step:g} s in the shortest kept period" in sentence
+    assert "(body 'beam')" in sentence
+    if 2 * step < period:
+        assert f"give matchedStepSize={step:g}" in sentence
+    else:
+        longest = float(re.search(r"steps shorter than (\S+) s and give this length as matchedStepSize", sentence)[1])
+        assert longest == pytest.approx(period / 2, rel=5e-3)
+        steps = round(1.2 * 0.1 / longest)
+    matched, told = pushed(model, start, 0.1, steps, matchedStepSize=0.1 / steps)
+    assert not told
+    assert distance(matched, native) < 1e-4
+    finer = float(re.search(r"or take steps of (\S+) s", sentence)[1])
+    short, told = pushed(model, start, 0.1, round(1.05 * 0.1 / finer))
+    assert not told
+    assert distance(short, native) < 0.015
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0**-10])
+def test_steps_that_delay_the_slowest_mode_over_a_long_run_are_told(scale):
+    """scale: of time."""
+    structure = mp.LinearStructure(np.eye(1), np.array([[1e4]]) / scale**2, points={"tip": 0})
+    model, end = mp.MultiPhiModel(structure, modes="all"), 2.0 * scale
+    found, (sentence,) = pushed(model, np.ones(1), end, 1000, force=0.0)
+    lag = 1000 * (0.2 - 2 * math.atan(0.1))
+    assert f"delay the slowest mode by {lag:.2g} rad" in sentence
+    assert distance(found, mp.simulate(model, end, displacement=np.ones(1))) > 0.2
+    finer = float(re.search(r"or take steps of (\S+) s", sentence)[1])
+    found, told = pushed(model, np.ones(1), end, round(1.05 * end / finer), force=0.0)
+    assert not told
+    assert distance(found, mp.simulate(model, end, displacement=np.ones(1))) < 0.05
+
+
+def test_nothing_is_told_of_steps_that_end_exactly():
+    """Alone under a load that varies, every step ends in the state of ``simulate``."""
+    model, start, _ = cantilever(12)
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    loads = [mp.HarmonicLoad("tip", 1.0, 10.0)]
+    items = CreateMultiPhiBody(mbs, model, "beam", displacement=start, loads=loads)
+    mbs.Assemble()
+    mbs.SolveDynamic(fixed_steps(0.1, 400, write_period=0.1 / 400), solverType=TRAPEZOIDAL)
+    found = body_histories(mbs, items)
+    assert not [sentence for sentence in found.warnings if "coarse steps" in sentence]
+    assert distance(found, mp.simulate(model, 0.1, displacement=start, loads=loads)) < 1e-6

@@ -34,7 +34,7 @@ def told(structure, interface, velocity):
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     model = mp.MultiPhiModel(structure, modes="all")
-    CreateMultiPhiBody(mbs, model, "bar", velocity=velocity, interface=interface)
+    CreateMultiPhiBody(mbs, model, "bar", velocity=velocity, interface=interface, matchedStepSize=END / 20)
     mbs.Assemble()
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")

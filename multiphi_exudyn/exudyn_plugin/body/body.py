@@ -19,7 +19,7 @@ A load or connector at coordinate k of the node acts on mode k of the present le
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -130,7 +130,7 @@ class MultiPhiBody:
         self.model = motion.model
         self.items: dict[str, Any] = {}
         self.matched_step = matched_step
-        self._time = math.nan
+        self._time, self._longest_step, self._duration = math.nan, 0.0, 0.0
         self._motion, self._loads, self._base_warnings = motion, tuple(loads), base_warnings
         self._size = self.model.level_at(()).modes
         self.own_loads = OwnLoads(self.model, loads, self._size, 0.0, end)
@@ -202,7 +202,15 @@ class MultiPhiBody:
         interface = self.coordinates.interface
         rotations = () if interface is None else interface.warnings(self.model.base.modes.rigid > 0)
         summary = self._record.summary(total_loss(self._events) + loss, truncated)
-        return (*warnings_of_body(self.model, summary), *self._base_warnings, *rotations)
+        return (*warnings_of_body(self.model, summary), *self._base_warnings, *rotations, *self._step_warnings)
+
+    @property
+    def _step_warnings(self) -> Iterable[str]:
+        """Warnings of steps that are long for modes that are not matched to them, unless every step ends exactly."""
+        ends_exactly = self._run_ahead is not None and self.varies
+        if self.matched_step is not None or ends_exactly or not self._longest_step:
+            return ()
+        return self._record.coarse_step_warning(self._longest_step, self._duration)
 
     def stepped_level(self, states: Sequence[int]) -> SteppedLevel:
         """The solver's level in which the elements are in these states."""
@@ -259,6 +267,7 @@ class MultiPhiBody:
         if self._run_in_progress is None or not t > self.time:
             return False  # called again for the same step
         check_matched(self, t - self.time)
+        self._longest_step = max(self._longest_step, t - self.time)
         self._run_in_progress.change_step_size(t - self.time)
         return True
 
@@ -331,6 +340,7 @@ class MultiPhiBody:
             check_start(mbs, self, self.start, sum(event.loss.impact for event in self._start_events))
         self._run_ahead, self._stepwise_run, self._time = None, None, t
         end = float(mbs.sys["simulationSettings"].timeIntegration.endTime)
+        self._longest_step, self._duration = step, end - t
         if self.varies:
             self.own_loads = OwnLoads(self.model, self._loads, self._size, t, end)
         as_created = all(
