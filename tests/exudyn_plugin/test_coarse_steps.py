@@ -99,11 +99,12 @@ def cantilever(modes):
 
 
 def pushed(model, start, end, steps, force=-1.0, **given):
-    """Histories of a body with a force at its tip, and what the run warns of."""
+    """Histories of a body, alone or with a force at its tip, and what the run warns of."""
     container = exu.SystemContainer()
     mbs = container.AddSystem()
-    items = CreateMultiPhiBody(mbs, model, "beam", displacement=start, interface=["tip"], **given)
-    mbs.AddLoad(LoadCoordinate(markerNumber=coordinate(mbs, items["nInterface"]["tip"]), load=force))
+    items = CreateMultiPhiBody(mbs, model, "beam", displacement=start, interface=["tip"] if force else (), **given)
+    if force:
+        mbs.AddLoad(LoadCoordinate(markerNumber=coordinate(mbs, items["nInterface"]["tip"]), load=force))
     mbs.Assemble()
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always", mp.MultiPhiWarning)
@@ -140,15 +141,18 @@ def test_steps_that_are_long_for_the_kept_modes_are_told_and_both_remedies_hold(
     assert distance(short, native) < 0.015
 
 
+@pytest.mark.parametrize("stop", [False, True], ids=["linear", "open stop"])
 @pytest.mark.parametrize("scale", [1.0, 2.0**-10])
-def test_steps_that_delay_the_slowest_mode_over_a_long_run_are_told(scale):
+def test_steps_that_delay_the_slowest_mode_over_a_long_run_are_told(scale, stop):
     """scale: of time."""
     structure = mp.LinearStructure(np.eye(1), np.array([[1e4]]) / scale**2, points={"tip": 0})
-    model, end = mp.MultiPhiModel(structure, modes="all"), 2.0 * scale
+    stops = [mp.UnilateralContact("stop", "tip", 2.0, 1e4)] if stop else []
+    model, end = mp.MultiPhiModel(structure, stops, modes="all"), 2.0 * scale
     found, (sentence,) = pushed(model, np.ones(1), end, 1000, force=0.0)
     lag = 1000 * (0.2 - 2 * math.atan(0.1))
     assert f"delay the slowest mode by {lag:.2g} rad" in sentence
     assert distance(found, mp.simulate(model, end, displacement=np.ones(1))) > 0.2
+    assert any("coarse steps" in each for each in found.warnings)
     finer = float(re.search(r"or take steps of (\S+) s", sentence)[1])
     found, told = pushed(model, np.ones(1), end, round(1.05 * end / finer), force=0.0)
     assert not told

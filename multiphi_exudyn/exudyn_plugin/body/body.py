@@ -318,6 +318,10 @@ class MultiPhiBody:
         self.end_run()
         return static_changes(self.name, level, xi[:, 0], reactions)
 
+    def take_steps(self, duration: float, step: float) -> None:
+        """Take notice of a run of this duration in steps of this length [s], for its warnings."""
+        self._longest_step, self._duration = step, duration
+
     def end_run(self) -> None:
         """Keep the level and the coordinates in which a run or a static solution ends."""
         self._end = self.coordinates.stepped.states, self.coordinates.views[0].copy()
@@ -340,7 +344,7 @@ class MultiPhiBody:
             check_start(mbs, self, self.start, sum(event.loss.impact for event in self._start_events))
         self._run_ahead, self._stepwise_run, self._time = None, None, t
         end = float(mbs.sys["simulationSettings"].timeIntegration.endTime)
-        self._longest_step, self._duration = step, end - t
+        self.take_steps(end - t, step)
         if self.varies:
             self.own_loads = OwnLoads(self.model, self._loads, self._size, t, end)
         as_created = all(

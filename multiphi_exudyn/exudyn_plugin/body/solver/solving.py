@@ -78,6 +78,11 @@ def _with_end_check(solve: Callable[..., Any]) -> Callable[..., Any]:
             raise
         if solver.output.finishedSuccessfully:
             bodies.check_called(solver.it.currentTime)
+            if not bodies.is_required:  # linear bodies are not called
+                settings = arguments[0] if arguments else keywords["simulationSettings"]
+                bodies.take_steps(
+                    solver.it.currentTime - settings.timeIntegration.startTime, solver.it.currentStepIndex
+                )
         return result
 
     setattr(solve_system, _CHECKED, True)

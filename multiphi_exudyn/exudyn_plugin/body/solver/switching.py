@@ -58,6 +58,9 @@ class SwitchingBody(Protocol):
     def restart_step(self) -> None:
         """Take the present state as the start of the next step."""
 
+    def take_steps(self, duration: float, step: float) -> None:
+        """Take notice of a run of this duration in steps of this length [s]."""
+
     def end_run(self) -> None:
         """Act at the end of a run."""
 
@@ -154,6 +157,12 @@ class Switching(dict[str, SwitchingBody]):
             None,
             math.inf,
         )
+
+    def take_steps(self, duration: float, count: int) -> None:
+        """Take notice of a run of this duration [s] in so many steps, in which the bodies were not called; warn."""
+        for body in self.values():
+            body.take_steps(duration, duration / max(count, 1))
+        self.warn()
 
     def check_called(self, t: float) -> None:
         """Raise if a run has reached t [s] without calls of the bodies: another PostStep function is installed."""
