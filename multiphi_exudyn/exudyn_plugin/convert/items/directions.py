@@ -17,12 +17,15 @@ REDUNDANT = 1e-9  # of a constraint's row: a smaller part that is independent of
 
 
 class Directions:
-    """A QR decomposition of C^T, its rows at unit length."""
+    """A QR decomposition of C^T, its rows at unit length.
+
+    mass: M (n, n). free (n, k): orthonormal basis of the directions that the constraints leave free.
+    """
 
     def __init__(self, jacobian: np.ndarray, mass: np.ndarray) -> None:
         self._count = len(jacobian)
         moving = np.any(jacobian, axis=1)  # an inactive constraint has no row
-        self._independent, self._mass = np.flatnonzero(moving), mass
+        self._independent, self.mass = np.flatnonzero(moving), mass
         fixed, free = np.zeros((len(mass), 0)), np.eye(len(mass))
         self._triangle = np.zeros((0, 0))
         if len(self._independent):
@@ -32,12 +35,12 @@ class Directions:
             self._lengths = np.linalg.norm(jacobian[self._independent], axis=1)[order[:rank]]
             self._independent, self._triangle = self._independent[order[:rank]], r[:rank, :rank]
             fixed, free = q[:, :rank], q[:, rank:]
-        self._fixed, self._free = fixed, free
+        self._fixed, self.free = fixed, free
         self._free_mass = free.T @ mass @ free
 
     def size(self, vector: np.ndarray) -> float:
         """|vector|_M."""
-        return float(np.sqrt(max(vector @ self._mass @ vector, 0.0)))
+        return float(np.sqrt(max(vector @ self.mass @ vector, 0.0)))
 
     def solve(self, force: np.ndarray, prescribed: np.ndarray) -> np.ndarray:
         """Solution a (n,) of M a = force - C^T mu, C a = prescribed."""
@@ -46,14 +49,14 @@ class Directions:
             values = prescribed[self._independent] / self._lengths
             particular = self._fixed @ scipy.linalg.solve_triangular(self._triangle, values, trans="T")
         return np.asarray(
-            particular + self._free @ np.linalg.solve(self._free_mass, self._free.T @ (force - self._mass @ particular))
+            particular + self.free @ np.linalg.solve(self._free_mass, self.free.T @ (force - self.mass @ particular))
         )
 
     def multipliers(self, force: np.ndarray) -> np.ndarray:
         """mu (m,) for prescribed = 0; redundant constraints have mu = 0."""
         mu = np.zeros(self._count)
         if len(self._independent):
-            reaction = force - self._mass @ self.solve(force, mu)
+            reaction = force - self.mass @ self.solve(force, mu)
             values = scipy.linalg.solve_triangular(self._triangle, self._fixed.T @ reaction)
             mu[self._independent] = values / self._lengths
         return mu
