@@ -44,7 +44,7 @@ from multiphi_exudyn.exudyn_plugin.convert.linearisation.full_system import (
     without_contacts,
 )
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.linearisation import MovedBy
-from multiphi_exudyn.exudyn_plugin.convert.linearisation.prescribed_motion import PrescribedMotion
+from multiphi_exudyn.exudyn_plugin.convert.linearisation.prescribed_motion import PrescribedMotion, RateLoad
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.start_state import moved_onto_constraints
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.timed_loads import (
     TimedLoad,
@@ -60,7 +60,7 @@ from multiphi_exudyn.levels.model.mode_choice import Tolerance, UpTo
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 from multiphi_exudyn.mechanics.elements.friction import Friction
-from multiphi_exudyn.mechanics.loads.loads import FunctionLoad
+from multiphi_exudyn.mechanics.loads.loads import FunctionLoad, VaryingLoad
 from multiphi_exudyn.mechanics.loads.moving_supports import StopMotion
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad
 from multiphi_exudyn.mechanics.loads.time_functions import Smooth
@@ -231,12 +231,12 @@ def _fixed(friction: Friction | str, prescribed: np.ndarray) -> Friction | str:
     return friction
 
 
-def _motion_loads(moved: MovedBy) -> Iterator[FunctionLoad]:
+def _motion_loads(moved: MovedBy) -> Iterator[VaryingLoad]:
     """Loads -S^T K e^T u and -S^T C e^T u' of a prescribed motion."""
-    for order, matrix in enumerate((moved.stiffness, moved.damping)):
-        for k, column in enumerate(matrix.T):
+    for kind, matrix in ((FunctionLoad, moved.stiffness), (RateLoad, moved.damping)):
+        for column, unit in zip(matrix.T, np.eye(matrix.shape[1]), strict=True):
             if np.any(column):
-                yield FunctionLoad(-column, _derivative(moved.motion, np.eye(matrix.shape[1])[k], order))
+                yield kind(-column, _combined(moved.motion, unit))
 
 
 def _stop_motions(
@@ -245,11 +245,11 @@ def _stop_motions(
     """The motion of a contact's stop by each prescribed motion: that of its gap, but opposite."""
     for motion in motions.values():
         if moved_by(row, motion.directions):
-            yield StopMotion(contact.name, Smooth(_derivative(motion, -motion.directions @ row, 0)))
+            yield StopMotion(contact.name, Smooth(_combined(motion, -motion.directions @ row)))
 
 
-def _derivative(motion: PrescribedMotion, weights: np.ndarray, order: int) -> Callable[[Any], float]:
-    return lambda t: float(weights @ motion.derivative(t, order))
+def _combined(motion: PrescribedMotion, weights: np.ndarray) -> Callable[[Any], float]:
+    return lambda t: float(weights @ motion.value(t))
 
 
 def _with_time_change(

@@ -160,7 +160,7 @@ class Comparison:
         """The error at displacement and velocity (n,), at a time [s] of the run, and c + d (n,) by modes.
 
         contacts: forces [N] of contacts and frictions by name. tolerance: stiff modes relax only while the error is
-        larger.
+        larger. The error is infinite where the system has no accelerations, as its mass is singular, or no finite ones.
         """
         linear = self._linear
         zero = np.zeros(len(linear.displacement))
@@ -176,7 +176,12 @@ class Comparison:
         relaxed, least, deviation = np.zeros(len(z)), math.inf, np.zeros(len(z))
         for softest in _stages(squares, scales.rate):
             displacement = position + linear.basis @ (z + shapes @ relaxed)
-            state = self._full.accelerations_at(displacement, velocity, contact_forces, scales.displacement, prescribed)
+            try:
+                state = self._full.accelerations_at(
+                    displacement, velocity, contact_forces, scales.displacement, prescribed
+                )
+            except np.linalg.LinAlgError:
+                break
             free = state.accelerations - driven
             difference = shapes.T @ (linear.mass @ (linear.basis.T @ free) - force)
             drift = difference / np.maximum(squares, scales.rate**2)
@@ -200,7 +205,12 @@ class Comparison:
         columns = []
         for shape in linear.unmoved.shapes.T:
             step = ASIDE * scale / float(np.max(np.abs(shape)))
-            ends = [self._full.accelerations_at(position + sign * step * shape, zero, zero, scale) for sign in (-1, 1)]
+            try:
+                ends = [
+                    self._full.accelerations_at(position + sign * step * shape, zero, zero, scale) for sign in (-1, 1)
+                ]
+            except np.linalg.LinAlgError:  # the error of this state is infinite already
+                return np.zeros((linear.unmoved.shapes.shape[1],) * 2)
             columns.append(linear.unmoved.momenta.T @ (ends[0].accelerations - ends[1].accelerations) / (2 * step))
         stiffness = np.array(columns)
         return (stiffness + stiffness.T) / 2
@@ -216,7 +226,10 @@ class Comparison:
             return 0.0
         self._full.set_time(linear.time + time)
         change, zero = linear.basis @ z + linear.prescribed(time), np.zeros(len(linear.displacement))
-        self._full.accelerations_at(linear.displacement + change, zero, zero, scale)
+        try:
+            self._full.accelerations_at(linear.displacement + change, zero, zero, scale)
+        except np.linalg.LinAlgError:
+            return math.inf
         angles = [0.0]
         for name, sphere in linear.spheres.items():
             gap, normal = self._full.gap_and_normal(sphere.index)

@@ -17,7 +17,15 @@ import scipy.linalg
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mathematics.eigenproblems.modes import Modes, complete_modes
 
-__all__ = ["ASYMMETRY", "CheckedMatrices", "NotLinearStructure", "check_mass", "checked_matrices", "coordinate_name"]
+__all__ = [
+    "ASYMMETRY",
+    "DIFFERENTIATED",
+    "CheckedMatrices",
+    "NotLinearStructure",
+    "check_mass",
+    "checked_matrices",
+    "coordinate_name",
+]
 
 ASYMMETRY = 1e-6  # of the largest entry: error of the numerical differentiation of connectors
 DIFFERENTIATED = (
@@ -56,7 +64,7 @@ def checked_matrices(
     """
     asymmetries: list[str] = []
     for name, matrix in (("mass", mass), ("stiffness", stiffness), ("damping", damping)):
-        _check_finite(mbs, name, matrix, basis)
+        check_finite(mbs, name, matrix, basis)
     _check_positive(mbs, mass, basis)
     mass = _symmetric(mbs, "mass", mass, basis, ASYMMETRY, asymmetries)
     stiffness = _symmetric(mbs, "stiffness", stiffness, basis, allowed, asymmetries)
@@ -75,7 +83,6 @@ def checked_matrices(
 
 def check_mass(mbs: Any, mass: np.ndarray, basis: np.ndarray) -> None:
     """Raise MultiPhiValueError for a mass M (n_full, n_full) that is not positive definite in the directions S."""
-    _check_finite(mbs, "mass", mass, np.eye(len(mass)))
     projected = basis.T @ mass @ basis
     try:
         pivots = np.diagonal(np.linalg.cholesky(projected)) ** 2
@@ -96,7 +103,8 @@ def _check_positive(mbs: Any, mass: np.ndarray, basis: np.ndarray) -> None:
         )
 
 
-def _check_finite(mbs: Any, name: str, matrix: np.ndarray, basis: np.ndarray) -> None:
+def check_finite(mbs: Any, name: str, matrix: np.ndarray, basis: np.ndarray) -> None:
+    """Raise MultiPhiValueError for a matrix (n, n) in the coordinates of S with an entry that is not finite."""
     bad = np.flatnonzero(~np.all(np.isfinite(matrix), axis=1))
     if len(bad):
         where = _largest_coordinate_name(mbs, basis[:, bad[0]])

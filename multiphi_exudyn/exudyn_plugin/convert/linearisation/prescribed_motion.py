@@ -11,6 +11,7 @@ offset on velocities is integrated over time.
 from __future__ import annotations
 
 import bisect
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -22,8 +23,11 @@ from multiphi_exudyn.exudyn_plugin.convert.items.directions import Directions
 from multiphi_exudyn.exudyn_plugin.convert.items.items import is_active
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.constraints import residuals
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.timed_loads import SAMPLE_TIMES, SystemPlaceholder
+from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
+from multiphi_exudyn.mechanics.loads.loads import VaryingLoad
+from multiphi_exudyn.mechanics.loads.time_functions import Smooth
 
-__all__ = ["PrescribedMotion", "prescribed_motions"]
+__all__ = ["PrescribedMotion", "RateLoad", "prescribed_motions"]
 
 UNIT = 1e-6  # m, rad: change of an offset, by whose effect its direction is determined
 FINE, COARSE = 1e-3, 1e-2  # of the time scale: steps of the first and of the second derivative
@@ -31,6 +35,7 @@ _OFFSETS = {"ConnectorCoordinate": 1, "JointGeneric": 6}  # constraints with off
 _AHEAD = np.array([-25, 48, -36, 16, -3]) / 12, np.array([35, -104, 114, -56, 11]) / 12  # at 0 to 4 steps
 _AROUND = np.array([1, -8, 0, 8, -1]) / 12, np.array([-1, 16, -30, 16, -1]) / 12  # at -2 to 2 steps
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(7)
+KEPT = 100_000  # values of a user function: several loads evaluate it at the same times
 HALVINGS = 20  # of an interval of integration, in search of a jump
 INTEGRATED = 1e-12  # of an integral of the absolute values: error of one interval
 
@@ -54,6 +59,29 @@ class PrescribedMotion:
         if self.speed:
             return self.speed(t) if order == 1 else _difference(self.speed, t, FINE * self.scale, 1)
         return _difference(self.value, t, (FINE if order == 1 else COARSE) * self.scale, order)
+
+
+@dataclass(frozen=True, eq=False)
+class RateLoad(VaryingLoad):
+    """A load by the rate of a function of time, f(t) = p u'(t), of the polynomials that approximate u."""
+
+    function: Callable[[Any], float]
+
+    @property
+    def course(self) -> Any:
+        """u'(t)."""
+        return _Rate(Smooth(self.function))
+
+
+@dataclass(frozen=True)
+class _Rate:
+    """u', as a function of time of a load."""
+
+    function: Smooth
+
+    def history(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
+        """u' up to ``end`` [s]."""
+        return self.function.history(end, finer).derivative
 
 
 def prescribed_motions(
@@ -145,8 +173,8 @@ def _motion(rows: np.ndarray, offset: Callable[[float], np.ndarray], of_velocity
     """Motion by the components of an offset that move anything."""
     moving = np.flatnonzero(np.any(rows, axis=1))
     first = offset(0.0)[moving]
-    speed = (lambda t: offset(t)[moving]) if of_velocity else None
-    value = _Integral(speed) if speed else lambda t: offset(t)[moving] - first
+    speed = functools.lru_cache(KEPT)(lambda t: offset(t)[moving]) if of_velocity else None
+    value = functools.lru_cache(KEPT)(_Integral(speed) if speed else lambda t: offset(t)[moving] - first)
     return PrescribedMotion(rows[moving], value, _time_scale(speed or value), speed)
 
 

@@ -23,7 +23,7 @@ from multiphi_exudyn.exudyn_plugin.convert.linearisation.geometric_stiffness imp
     mass_matrix,
     static_solver,
 )
-from multiphi_exudyn.exudyn_plugin.convert.linearisation.matrix_checks import check_mass
+from multiphi_exudyn.exudyn_plugin.convert.linearisation.matrix_checks import check_finite, check_mass
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.prescribed_motion import PrescribedMotion, prescribed_motions
 
 __all__ = ["StartState", "moved_onto_constraints", "violated_constraints"]
@@ -51,14 +51,13 @@ def moved_onto_constraints(mbs: Any, objects: Sequence[Mapping[str, Any]], time:
     data, kinds = mbs.systemData, exu.ConfigurationType
     with static_solver(mbs) as solver:
         data.SetTime(time)
-        start, jacobian, mass = data.GetODE2Coordinates(), constraint_jacobian(mbs, solver), mass_matrix(mbs, solver)
-        directions = Directions(jacobian, mass)
-        check_mass(mbs, mass, directions.free)
+        start, jacobian = data.GetODE2Coordinates(), constraint_jacobian(mbs, solver)
+        directions = _directions(mbs, jacobian, mass_matrix(mbs, solver))
         violated = _meet(mbs, solver, directions)
         shift = data.GetODE2Coordinates() - start
         if np.any(shift):
             jacobian = constraint_jacobian(mbs, solver)
-            directions = Directions(jacobian, mass)
+            directions = Directions(jacobian, directions.mass)
         motions = prescribed_motions(mbs, solver, objects, time, directions)
         present = [motion for motion in motions.values() if isinstance(motion, PrescribedMotion)]
         velocity = _consistent_velocity(mbs, solver, jacobian, directions, present)
@@ -71,10 +70,24 @@ def moved_onto_constraints(mbs: Any, objects: Sequence[Mapping[str, Any]], time:
 def violated_constraints(mbs: Any) -> tuple[str, ...]:
     """Names of the constraints on positions that the initial state violates; raise for a coordinate without mass."""
     with static_solver(mbs) as solver:
-        jacobian, mass = constraint_jacobian(mbs, solver), mass_matrix(mbs, solver)
-        check_mass(mbs, mass, Directions(jacobian, mass).free)
+        jacobian = constraint_jacobian(mbs, solver)
+        _directions(mbs, jacobian, mass_matrix(mbs, solver))
         left = np.where(on_velocities(mbs, solver, jacobian), 0.0, residuals(mbs, solver))
         return tuple(_names(mbs, _violated(left, jacobian, VIOLATED * _largest(mbs))))
+
+
+def _directions(mbs: Any, jacobian: np.ndarray, mass: np.ndarray) -> Directions:
+    """Directions of the constraints; raise MultiPhiValueError for values that are not finite, and without mass."""
+    bad = np.flatnonzero(~np.all(np.isfinite(jacobian), axis=1))
+    if len(bad):
+        raise MultiPhiValueError(
+            f"mbs: got constraints with a Jacobian that is not finite ({', '.join(_names(mbs, bad))}), need a state "
+            "where their directions exist"
+        )
+    check_finite(mbs, "mass", mass, np.eye(len(mass)))
+    directions = Directions(jacobian, mass)
+    check_mass(mbs, mass, directions.free)
+    return directions
 
 
 def _meet(mbs: Any, solver: Any, directions: Directions) -> list[str]:

@@ -27,6 +27,7 @@ from multiphi_exudyn.exudyn_plugin.convert.linearisation.geometric_stiffness imp
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.linearisation import Linearisation, MovedBy, UnmovedDirections
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.matrix_checks import (
     ASYMMETRY,
+    DIFFERENTIATED,
     CheckedMatrices,
     NotLinearStructure,
     checked_matrices,
@@ -49,7 +50,7 @@ def _tangent_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
     """M, K, C (n, n), and S (n_full, n).
 
     Entries of K that are round-off of the geometric stiffness, or of a force over the system's size, are set to zero:
-    they would be a frequency, or an instability.
+    they would be a frequency, or an instability. So are entries of C that are round-off of sqrt(k m).
     """
     springs, geometric = _springs_with_factors(mbs), geometric_stiffness(mbs)
     with _without_stiffness(mbs, springs):
@@ -67,7 +68,8 @@ def _tangent_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
         row = _row(mbs, item) @ basis
         stiffness += item["stiffness"] * np.outer(row, row)
         damping += item["damping"] * np.outer(row, row)
-    return mass, stiffness, damping, basis
+    critical = math.sqrt(float(np.max(np.abs(stiffness)) * np.max(np.abs(mass))))
+    return mass, stiffness, drop_round_off(damping, np.float64(critical)), basis
 
 
 def _row(mbs: Any, spring: Mapping[str, Any]) -> np.ndarray:
@@ -88,6 +90,15 @@ def _by_motions(mbs: Any, motions: Mapping[int, PrescribedMotion]) -> dict[int, 
         stiffness += item["stiffness"] * np.outer(row, row)
         damping += item["damping"] * np.outer(row, row)
     return {i: tuple(_product(a, m.directions.T) for a in (mass, stiffness, damping)) for i, m in motions.items()}
+
+
+def _moved_by(
+    motion: PrescribedMotion, basis: np.ndarray, momenta: np.ndarray, stiffness: np.ndarray, damping: np.ndarray
+) -> MovedBy:
+    """Its forces S^T K e^T and S^T C e^T; damping that is an error of differentiation beside the stiffness is zero."""
+    stiffness, damping = _product(basis.T, stiffness), _product(basis.T, damping)
+    negligible = DIFFERENTIATED * motion.scale * np.max(np.abs(stiffness), axis=0)
+    return MovedBy(motion, momenta, stiffness, np.where(np.abs(damping) <= negligible, 0.0, damping))
 
 
 def _product(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
@@ -136,10 +147,7 @@ def linearised(
         mbs, velocity - moved_velocity, np.vstack([present, *rows, *pulls])
     )
     mass, stiffness, damping = checked.mass, checked.stiffness, checked.damping
-    moved = {
-        i: MovedBy(motions[i], momenta, *(_product(basis.T, pull) for pull in pair))
-        for i, (momenta, *pair) in by_motions.items()
-    }
+    moved = {i: _moved_by(motions[i], basis, *matrices) for i, matrices in by_motions.items()}
     static = basis.T @ present + damping @ (basis.T @ (velocity - moved_velocity))
     static += sum((each.damping @ each.motion.derivative(0.0, 1) for each in moved.values()), np.zeros(len(static)))
     largest = _largest_coordinate(mbs)
