@@ -54,7 +54,10 @@ def violations_of_friction(run: Trajectory, times: np.ndarray) -> list[str]:
         row, force = run.model.structure.row(element.direction), run.friction_force(element.name, times)
         place, speed = row @ run.displacement(times), row @ run.velocity(times) - element.velocity
         fastest = np.abs(speed).max()
-        sticks, most = np.zeros(len(times), bool), element.limit if element.static_limit is None else element.static_limit
+        sticks, most = (
+            np.zeros(len(times), bool),
+            element.limit if element.static_limit is None else element.static_limit,
+        )
         for first, last in run.stick_intervals(element.name):
             within = (times > first) & (times < last)
             sticks |= within

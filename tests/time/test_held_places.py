@@ -76,7 +76,9 @@ def test_the_friction_of_a_guided_block_is_that_of_its_pressure():
     ],
     ids=str,
 )
-@pytest.mark.parametrize("loads", [(), (mp.ConstantLoad("x", 1.0), mp.SampledLoad("y", [0, 0.3, 0.6, 9], [0, 5, 0, 0]))])
+@pytest.mark.parametrize(
+    "loads", [(), (mp.ConstantLoad("x", 1.0), mp.SampledLoad("y", [0, 0.3, 0.6, 9], [0, 5, 0, 0]))]
+)
 def test_sliding_beside_a_friction_spring_keeps_the_equation_of_motion(model, loads):
     run, loads = slide(model, loads=loads)
     assert_lawful(run, loads)

@@ -41,12 +41,12 @@ def assert_lawful(run, loads=()):
 
 
 @pytest.mark.parametrize("up", [1.0, -1.0])
-@pytest.mark.parametrize(("m", "k", "limit", "e", "g"), [(1, 10, 1, 0.5, 3), (0.5, 200, 2, 0.9, 10), (4, 3, 0.25, 1, 1)])
+@pytest.mark.parametrize(
+    ("m", "k", "limit", "e", "g"), [(1, 10, 1, 0.5, 3), (0.5, 200, 2, 0.9, 10), (4, 3, 0.25, 1, 1)]
+)
 def test_after_its_second_bounce_the_spring_unloads(m, k, limit, e, g, up):
     load = mp.ConstantLoad("y", -m * g * up)
-    run = mp.simulate(
-        falling(e, springs(limit, stiffness=k), m, up), 8.0, displacement=np.array([up]), loads=[load]
-    )
+    run = mp.simulate(falling(e, springs(limit, stiffness=k), m, up), 8.0, displacement=np.array([up]), loads=[load])
     _, second, *rest = bounces(run)
     after = np.linspace(0.0, 0.9 * min([1.0, *(third - second for third in rest[:1])]), 12)
     omega, centre = np.sqrt(k / m), (limit - m * g) / k  # m x'' = -m g - (k x - F) from the stop
@@ -82,13 +82,18 @@ def test_beside_other_elements(more):
     else:
         friction = [mp.Friction("spring0", "y", 1.0, stiffness=10.0, velocity=-0.5)]
     loads = [mp.ConstantLoad("y", -3.0)]
-    assert_lawful(mp.simulate(falling(0.5, friction, gap=0.2, more=further), 3.0, displacement=[1.0], loads=loads), loads)
+    assert_lawful(
+        mp.simulate(falling(0.5, friction, gap=0.2, more=further), 3.0, displacement=[1.0], loads=loads), loads
+    )
 
 
 def test_a_spring_that_the_impact_does_not_unload_slips():
     """The impact is on another body: the spring reaches its limit at that instant and slips on."""
     structure = mp.LinearStructure(np.eye(2), np.zeros((2, 2)), points={"y": 0, "z": 1})
-    stop, spring = mp.UnilateralContact("stop", "y", 0.0, restitution=0.5), mp.Friction("spring", "z", 1.0, stiffness=2.0)
+    stop, spring = (
+        mp.UnilateralContact("stop", "y", 0.0, restitution=0.5),
+        mp.Friction("spring", "z", 1.0, stiffness=2.0),
+    )
     quarter = np.pi / 2 / np.sqrt(2.0)  # z = a sin(omega t), at its limit k z = -F at an eighth of its period
     start, velocity = [0.5 * quarter, 0.0], [-1.0, -1.0]
     run = mp.simulate(mp.MultiPhiModel(structure, [stop, spring]), 1.0, displacement=start, velocity=velocity)

@@ -63,9 +63,9 @@ class SteppedLevel:
         level, held = loaded.modal, loaded.channels.force[:, loaded.excitation.prescribed :]
         if np.any(held):
             raise NumericalFailure(
-                f"level {', '.join(level.closed)}: a friction spring drives a motion that nothing holds, by the friction "
-                "of a sliding contact or beside a negative stiffness; inside Exudyn that is not possible: give the "
-                "motion a small stiffness, or use simulate"
+                f"level {', '.join(level.closed)}: a friction spring drives a motion that nothing holds, by the "
+                "friction of a sliding contact or beside a negative stiffness; inside Exudyn that is not possible: "
+                "give the motion a small stiffness, or use simulate"
             )
         squares, damping = np.full(size, np.max(level.squares, initial=0.0)), np.zeros((size, size))
         squares[: level.modes] = level.squares
