@@ -134,6 +134,33 @@ def test_floating_between_two_constant_forces():
     assert np.abs(held[free]).max() > 0.1  # else nothing is tested
 
 
+@pytest.mark.parametrize(
+    "rest", [1e-14, 1e-13, 1e-12, -1e-12, 1e-11, 1e-10, -1e-9, 1e-8, 9e-8, 2e-7, -2e-7, 1e-6, 1e-4]
+)
+@pytest.mark.parametrize("velocity", [0.0, -1.0, 0.5])
+@pytest.mark.parametrize("bodies", [1, 2])
+def test_a_slope_that_nearly_cancels_a_friction_spring(rest, velocity, bodies):
+    """The motion depends on the rest of the stiffness as smoothly as the forces do."""
+    loads = [mp.SampledLoad("x", [0.0, 1.0, 2.0, 9.0], [0.0, -10.0, 0.0, 0.0])]
+    zero, run = (
+        mp.simulate(floating(10.0 * (1 + part), velocity, bodies=bodies), 4.0, loads=loads) for part in (0.0, rest)
+    )
+    assert run.status == "ok", run.message
+    times = np.linspace(0.0, 4.0, 41)
+    expected = zero.at("x", times)
+    assert_allclose(run.at("x", times), expected, rtol=0, atol=(4 * abs(rest) + 1e-7) * np.abs(expected).max())
+    if abs(rest) < 1e-7:
+        assert abs(run.ledger.residual) < 1e-9
+
+
+def test_a_soft_spring_that_cancels_nothing_keeps_its_frequency():
+    """It is as small beside the stiff ones as the rest of springs that cancel."""
+    structure = mp.LinearStructure(np.eye(2), np.diag([1.0, 1e10]), None, {"soft": 0, "stiff": 1})
+    law = mp.ForceLaw("stiff", (np.array([-1.0, -0.5, 0.5, 1.0]), np.array([-1.0, 5e8, -5e8, 1.0])), name="law")
+    run = mp.simulate(mp.MultiPhiModel(structure, [law]), 3.0, displacement=[1.0, 0.0])
+    assert_allclose(run.at("soft", 3.0), np.cos(3.0), rtol=0, atol=1e-9)
+
+
 def test_many_runs_and_continued_ones_are_the_same_motion():
     model, times = sliding_block(), np.linspace(0.0, 1.0, 21)
     whole, loads = slide(model)
