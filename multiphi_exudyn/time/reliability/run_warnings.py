@@ -6,6 +6,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
                               contact forces are off; known before any run
     "truncated friction: ..." levels in which friction sticks with few modes: its force there is off
     "backward slip: ..."      truncated friction that moves against its slip (friction_warnings.py)
+    "redundant contacts: ..." rigid contacts that share a load and rub differently (friction_warnings.py)
     "redundant friction: ..." friction whose share of the load, and begin of slip, is not unique (friction_warnings.py)
     "friction in turn: ..."   friction at rigid contacts that is decided in an order (friction_warnings.py)
     "several impacts: ..."    an impact with friction for which Coulomb's law has several solutions (impact_warnings.py)
