@@ -687,3 +687,23 @@ class TestMeshImpacts:
         )
         assert run.ledger.impact > 0.01 * run.ledger.initial
         assert run.warnings == ()
+
+
+@pytest.mark.parametrize("error", [1.0, 0.3])
+def test_after_a_tolerance_another_remedy_is_told_than_a_tolerance(error):
+    """Alone and among many; without one it is the remedy."""
+
+    def warned(modes):
+        start = 3e-3 * np.arange(18.0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            alone = mp.simulate(long_chain(modes), 0.5, displacement=start).warnings
+            many = mp.simulate_many(long_chain(modes), 0.5, np.array([start, start])).warnings
+        assert list(many) == [alone, alone]
+        return " ".join(alone)
+
+    tolerant = warned(mp.Tolerance(error))
+    assert "truncated contact" in tolerant
+    assert "modes=Tolerance" not in tolerant
+    assert f"give Tolerance an error below {error:g}" in tolerant
+    assert "or modes=Tolerance(0.01)" in warned(4)
