@@ -11,7 +11,7 @@ import numpy as np
 
 from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 from multiphi_exudyn.mechanics.loads.loads import FunctionLoad, Load, SweepLoad
-from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion
+from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion, StopsMotion
 from multiphi_exudyn.mechanics.loads.samples import Sampled
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.loads.time_functions import Harmonic, Smooth, Sweep, TimeFunction
@@ -28,7 +28,7 @@ def forces_at(structure: LinearStructure, loads: Sequence[Load], times: np.ndarr
 def _force(structure: LinearStructure, load: Load, times: np.ndarray, end: float) -> np.ndarray | None:
     if isinstance(load, (ConstantLoad, Gravity)):
         return np.outer(load.row(structure), np.ones(len(times)))
-    if isinstance(load, StopMotion):
+    if isinstance(load, (StopMotion, StopsMotion)):
         return None
     if isinstance(load, BaseMotion):
         carried = structure.mass @ structure.row(load.direction)

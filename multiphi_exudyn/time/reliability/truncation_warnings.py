@@ -54,20 +54,26 @@ def truncation_warnings(
 ) -> tuple[str, ...]:
     """One warning of motion and energy lost to truncation, or none; struck: whether a rigid contact was struck."""
     share, error = verdict
-    kept = model.level_at(()).modes if tolerance is not None else 0
-    change = None if tolerance is None else model.entries.find(CHANGE)
+    if tolerance is not None and (told := _of_tolerance(model, share, error, tolerance)):
+        return (told,)
+    return _sentence(share, error, struck)
+
+
+def _of_tolerance(model: MultiPhiModel, share: float, error: float, tolerance: Tolerance) -> str:
+    """Warning of a tolerance that the run which decided the modes, or this one, does not keep, or ""."""
+    kept, change = model.level_at(()).modes, model.entries.find(CHANGE)
     if change is not None:
         found = f"differs by {per_cent(change)} from" if math.isfinite(change) else "could not be compared with"
         return (
             f"truncation: with {kept} modes the run that decided them {found} one with another number of modes, the "
-            f"tolerance is {tolerance.error:g}{_also_lost(share)}; give Tolerance a larger most=, or a shorter run",
+            f"tolerance is {tolerance.error:g}{_also_lost(share)}; give Tolerance a larger most=, or a shorter run"
         )
-    if tolerance is not None and error > tolerance.error:
+    if error > tolerance.error:
         return (
             f"truncation: the indicator is {error:.2g} with {kept} modes, the tolerance {tolerance.error:g}"
-            f"{_also_lost(share)}; give Tolerance a larger most=, or a new model, so that it decides by this run",
+            f"{_also_lost(share)}; give Tolerance a larger most=, or a new model, so that it decides by this run"
         )
-    return _sentence(share, error, struck)
+    return ""
 
 
 @functools.lru_cache(TEXTS)
