@@ -311,7 +311,7 @@ class MultiPhiBody:
             reactions = -coordinates.direct_reactions(stepped) @ interface.forces
             interface.record_angles()
         self._record.include_level(level.level)
-        self.end_run()
+        self._keep_end()
         return static_changes(self.name, level, xi[:, 0], reactions)
 
     def take_steps(self, mbs: Any, duration: float, step: float) -> None:
@@ -327,10 +327,16 @@ class MultiPhiBody:
     def _begin_step_errors(self, time: float, step: float, end: float, corrected: bool) -> None:
         """Begin the estimate of the steps' error, unless the modes are matched or every step ends exactly."""
         unmatched = self.matched_step is None and not (corrected and self.varies)
-        self._step_errors = StepErrors(step, end, corrected) if unmatched else None
+        self._step_errors = StepErrors(step, time, end, corrected) if unmatched else None
         self.include_step_error(time)
 
     def end_run(self) -> None:
+        """Take notice of the state at the end of a run."""
+        self._keep_end()
+        if self._step_errors is not None:
+            self._step_errors.finish(self.coordinates)
+
+    def _keep_end(self) -> None:
         """Keep the level and the coordinates in which a run or a static solution ends."""
         self._end = self.coordinates.stepped.states, self.coordinates.views[0].copy()
 

@@ -4,7 +4,8 @@ It lowers the frequency of a mode, so after a time t its phase lags by
 
     phi = (omega - (2/h) arctan(omega h/2)) t,   about omega t (omega h)^2 / 12
 
-From the state at the start of a run and at every event on, the error of a displacement is estimated as
+From the state at the start of a run and at every event on, and with that at its end for the whole run, as others may
+have excited the body on the way, the error of a displacement is estimated as
 
     sqrt(sum a^2 min(phi, 2)^2 / max sum (eta^2 + eta'^2/omega^2)),   a^2 = (eta''/omega^2)^2 + (eta'/omega)^2
 
@@ -25,19 +26,19 @@ from multiphi_exudyn.exudyn_plugin.body.state.coordinates import Coordinates
 
 __all__ = ["StepErrors"]
 
-TOLERATED = 0.01  # of the largest displacement: a smaller estimate is not told
+TOLERATED = 0.005  # of the largest displacement: a smaller estimate is not told
 OPPOSITE = 2.0  # largest difference of two vibrations of amplitude one
 HALVED = 0.5 ** np.arange(16)  # steps in units of the solver's
 
 
 class StepErrors:
-    """Estimate for a run until ``end`` [s] in steps of length ``step`` [s].
+    """Estimate for a run from ``start`` to ``end`` [s] in steps of length ``step`` [s].
 
     corrected: whether events correct the motion, which then lags from one to the next only.
     """
 
-    def __init__(self, step: float, end: float, corrected: bool) -> None:
-        self.step, self._end, self._corrected = step, end, corrected
+    def __init__(self, step: float, start: float, end: float, corrected: bool) -> None:
+        self.step, self._start, self._end, self._corrected = step, start, end, corrected
         self._last: tuple[float, np.ndarray, np.ndarray] = end, np.zeros(0), np.zeros(0)
         self._squares, self._size, self._fastest = np.zeros(len(HALVED)), 0.0, 0.0
 
@@ -56,6 +57,11 @@ class StepErrors:
         self._fastest = max(self._fastest, float(np.max(omega, initial=0.0)))
         if not self._corrected:
             self._squares = self._squares_until(self._end)
+
+    def finish(self, coordinates: Coordinates) -> None:
+        """Include the state at the end of the run."""
+        if not self._corrected:
+            self.include(coordinates, self._start)
 
     def _squares_until(self, time: float) -> np.ndarray:
         """Largest squares of the errors until a time [s], for all steps (k,)."""
