@@ -19,7 +19,7 @@ A load or connector at coordinate k of the node acts on mode k of the present le
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -39,6 +39,7 @@ from multiphi_exudyn.exudyn_plugin.body.solver.switching import bodies_of, is_is
 from multiphi_exudyn.exudyn_plugin.body.state.coordinates import SAME_STEP, Coordinates
 from multiphi_exudyn.exudyn_plugin.body.state.level_data import LevelData
 from multiphi_exudyn.exudyn_plugin.body.state.run_record import RunRecord
+from multiphi_exudyn.exudyn_plugin.body.state.step_errors import StepErrors
 from multiphi_exudyn.exudyn_plugin.body.stepping.own_loads import OwnLoads
 from multiphi_exudyn.exudyn_plugin.body.stepping.start_state import start_state
 from multiphi_exudyn.exudyn_plugin.body.stepping.step_by_step import StepwiseRun
@@ -130,7 +131,7 @@ class MultiPhiBody:
         self.model = motion.model
         self.items: dict[str, Any] = {}
         self.matched_step = matched_step
-        self._time, self._longest_step, self._duration = math.nan, 0.0, 0.0
+        self._time = math.nan
         self._motion, self._loads, self._base_warnings = motion, tuple(loads), base_warnings
         self._size = self.model.level_at(()).modes
         self.own_loads = OwnLoads(self.model, loads, self._size, 0.0, end)
@@ -138,6 +139,7 @@ class MultiPhiBody:
         max_levels = self.model.most_levels
         self._stepped_levels: BoundedCache[tuple[int, ...], SteppedLevel] = BoundedCache(max_levels)
         self._static_states: tuple[int, ...] | None = None
+        self._step_errors: StepErrors | None = None
         self._end: tuple[tuple[int, ...], np.ndarray] | None = None
         self._run_ahead: RunAhead | None = None
         self._stepwise_run: StepwiseRun | None = None
@@ -201,16 +203,9 @@ class MultiPhiBody:
         loss = total_loss(() if self._stepwise_run is None else self._stepwise_run.events)
         interface = self.coordinates.interface
         rotations = () if interface is None else interface.warnings(self.model.base.modes.rigid > 0)
+        delays = () if self._step_errors is None else self._step_errors.warnings
         summary = self._record.summary(total_loss(self._events) + loss, truncated)
-        return (*warnings_of_body(self.model, summary), *self._base_warnings, *rotations, *self._step_warnings)
-
-    @property
-    def _step_warnings(self) -> Iterable[str]:
-        """Warnings of steps that are long for modes that are not matched to them, unless every step ends exactly."""
-        ends_exactly = self._run_ahead is not None and self.varies
-        if self.matched_step is not None or ends_exactly or not self._longest_step:
-            return ()
-        return self._record.coarse_step_warning(self._longest_step, self._duration)
+        return (*warnings_of_body(self.model, summary), *self._base_warnings, *rotations, *delays)
 
     def stepped_level(self, states: Sequence[int]) -> SteppedLevel:
         """The solver's level in which the elements are in these states."""
@@ -267,7 +262,8 @@ class MultiPhiBody:
         if self._run_in_progress is None or not t > self.time:
             return False  # called again for the same step
         check_matched(self, t - self.time)
-        self._longest_step = max(self._longest_step, t - self.time)
+        if self._step_errors is not None:
+            self._step_errors.step = max(self._step_errors.step, t - self.time)
         self._run_in_progress.change_step_size(t - self.time)
         return True
 
@@ -315,14 +311,32 @@ class MultiPhiBody:
             reactions = -coordinates.direct_reactions(stepped) @ interface.forces
             interface.record_angles()
         self._record.include_level(level.level)
-        self.end_run()
+        self._keep_end()
         return static_changes(self.name, level, xi[:, 0], reactions)
 
-    def take_steps(self, duration: float, step: float) -> None:
-        """Take notice of a run of this duration in steps of this length [s], for its warnings."""
-        self._longest_step, self._duration = step, duration
+    def take_steps(self, mbs: Any, duration: float, step: float) -> None:
+        """Take notice of a run of this duration in steps of this length [s], in which the body was not called."""
+        self.coordinates.attach(mbs)
+        self._begin_step_errors(0.0, step, duration, corrected=False)
+
+    def include_step_error(self, time: float) -> None:
+        """Take notice of the present state, after an event at a time [s], for the estimate of the steps' error."""
+        if self._step_errors is not None:
+            self._step_errors.include(self.coordinates, time)
+
+    def _begin_step_errors(self, time: float, step: float, end: float, corrected: bool) -> None:
+        """Begin the estimate of the steps' error, unless the modes are matched or every step ends exactly."""
+        unmatched = self.matched_step is None and not (corrected and self.varies)
+        self._step_errors = StepErrors(step, time, end, corrected) if unmatched else None
+        self.include_step_error(time)
 
     def end_run(self) -> None:
+        """Take notice of the state at the end of a run."""
+        self._keep_end()
+        if self._step_errors is not None:
+            self._step_errors.finish(self.coordinates)
+
+    def _keep_end(self) -> None:
         """Keep the level and the coordinates in which a run or a static solution ends."""
         self._end = self.coordinates.stepped.states, self.coordinates.views[0].copy()
 
@@ -344,7 +358,6 @@ class MultiPhiBody:
             check_start(mbs, self, self.start, sum(event.loss.impact for event in self._start_events))
         self._run_ahead, self._stepwise_run, self._time = None, None, t
         end = float(mbs.sys["simulationSettings"].timeIntegration.endTime)
-        self.take_steps(end - t, step)
         if self.varies:
             self.own_loads = OwnLoads(self.model, self._loads, self._size, t, end)
         as_created = all(
@@ -355,6 +368,7 @@ class MultiPhiBody:
         self._events = [replace(event, time=t) for event in self._start_events] if as_created else []
         self._state = start_state(self, self.own_loads, mbs, t, step, isolated, as_created)
         self._record = RunRecord(self._state, self._motion.start_loss if as_created else Loss())
+        self._begin_step_errors(t, step, end, isolated)
         if isolated:
             self._begin_run_ahead(mbs, step, end)
         else:

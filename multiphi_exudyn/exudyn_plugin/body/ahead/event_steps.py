@@ -46,6 +46,9 @@ class IsolatedBody(Protocol):
     def varies(self) -> bool:
         """Whether its loads vary in time."""
 
+    def include_step_error(self, time: float) -> None:
+        """Take notice of the present state, after an event at a time [s]."""
+
     def stepped_level(self, states: tuple[int, ...]) -> SteppedLevel:
         """The solver's level in which the elements are in these states."""
 

@@ -136,6 +136,7 @@ class RunAhead:
         coordinates.set_level_if_changed(mbs, stepped, held, stepped.drive)
         coordinates.write(stepped, held, self._state)
         coordinates.write_level_data(steps.data[k])
+        self._body.include_step_error(float(steps.times[k]))
         self._changes_passed, self._next = steps.changes_passed[k], k + 1
 
     def _next_time(self) -> float:

@@ -80,9 +80,8 @@ def _with_end_check(solve: Callable[..., Any]) -> Callable[..., Any]:
             bodies.check_called(solver.it.currentTime)
             if not bodies.is_required:  # linear bodies are not called
                 settings = arguments[0] if arguments else keywords["simulationSettings"]
-                bodies.take_steps(
-                    solver.it.currentTime - settings.timeIntegration.startTime, solver.it.currentStepIndex
-                )
+                duration = solver.it.currentTime - settings.timeIntegration.startTime
+                bodies.take_steps(mbs, duration, solver.it.currentStepIndex)
         return result
 
     setattr(solve_system, _CHECKED, True)

@@ -58,8 +58,8 @@ class SwitchingBody(Protocol):
     def restart_step(self) -> None:
         """Take the present state as the start of the next step."""
 
-    def take_steps(self, duration: float, step: float) -> None:
-        """Take notice of a run of this duration in steps of this length [s]."""
+    def take_steps(self, mbs: Any, duration: float, step: float) -> None:
+        """Take notice of a run of this duration in steps of this length [s], in which it was not called."""
 
     def end_run(self) -> None:
         """Act at the end of a run."""
@@ -158,10 +158,10 @@ class Switching(dict[str, SwitchingBody]):
             math.inf,
         )
 
-    def take_steps(self, duration: float, count: int) -> None:
+    def take_steps(self, mbs: Any, duration: float, count: int) -> None:
         """Take notice of a run of this duration [s] in so many steps, in which the bodies were not called; warn."""
         for body in self.values():
-            body.take_steps(duration, duration / max(count, 1))
+            body.take_steps(mbs, duration, duration / max(count, 1))
         self.warn()
 
     def check_called(self, t: float) -> None:

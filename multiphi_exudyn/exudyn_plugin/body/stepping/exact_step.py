@@ -47,6 +47,9 @@ class BodyInStep(Protocol):
     def varying_load_force(self, states: tuple[int, ...], time: float) -> np.ndarray:
         """Force (p, f) of the body's own varying loads at a time [s], in a level."""
 
+    def include_step_error(self, time: float) -> None:
+        """Take notice of the present state, after an event at a time [s]."""
+
 
 @dataclass(frozen=True)
 class Step:

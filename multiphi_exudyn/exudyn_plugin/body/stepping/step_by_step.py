@@ -116,6 +116,7 @@ class StepwiseRun:
         self._record.include_state(outcome.state)
         self._choose_test()
         coordinates.write_level_data(coordinates.layout.from_state(outcome.state))
+        self._body.include_step_error(t)
         bodies = bodies_of(mbs)
         bodies.others_disturbed = bodies.others_disturbed or outcome.disturbs_others
 
