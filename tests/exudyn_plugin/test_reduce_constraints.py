@@ -468,6 +468,18 @@ def test_damping_that_is_round_off_is_none(scale, damping):
     assert reduce(system.mbs).structure.damping is None
 
 
+@pytest.mark.parametrize("scale", [2.0**-30, 1.0, 2.0**40])
+def test_negative_damping_that_is_round_off_is_none_in_the_only_direction_that_moves(scale):
+    """Two masses that nothing moves, on a spring that would drive them apart, and one that flies."""
+    system = Masses(scale * np.ones(3), (0.0, 0.0, 0.3))
+    system.coordinates(np.zeros((3, 3)), -2.8e-44 * scale * np.eye(3))
+    system.spring(0, 1, -100.0 * scale)
+    system.mbs.Assemble()
+    reduction = reduce(system.mbs)
+    assert (reduction.structure.n, reduction.structure.damping) == (1, None)
+    assert run(reduction).displacement(END) == pytest.approx(0.3 * END)
+
+
 def test_directions_that_are_moved_have_no_round_off_of_the_others():
     rng = np.random.default_rng(3)
     mass, stiffness, push = np.eye(8), np.zeros((8, 8)), np.zeros((1, 8))

@@ -45,6 +45,14 @@ class TestMultiPhiModel:
     def test_a_single_name_is_no_set_of_contacts(self, refused):
         refused(TypeError, "closed: got 'stop'", MultiPhiModel(chain(4), [stop()], modes=2).level, "stop")
 
+    @pytest.mark.parametrize("modes", ["all", 2, None])
+    def test_is_shown_with_an_indefinite_stiffness_which_its_levels_refuse(self, modes, refused):
+        swapped = LinearStructure(np.eye(2), np.array([[1.0, 2.0], [2.0, 1.0]]), None, {"m0": 0})
+        m = MultiPhiModel(swapped, [stop()], modes)
+        assert repr(m).startswith("<MultiPhiModel: degrees of freedom 2; contacts stop; modes ")
+        assert (m.levels_built, m.levels_kept) == (0, 0)
+        refused(ValueError, "stiffness: indefinite", m.level)
+
     def test_levels_are_built_on_first_use_and_kept(self):
         m = MultiPhiModel(chain(4), [stop(), stop("m3", name="other")], modes=2)
         assert m.levels_built == 0

@@ -3,7 +3,8 @@
     q = q_0 + S z
 
 q [m, rad, ...] are the system's ODE2 coordinates, q_0 those of the linearised state, S a basis of the directions that
-its constraints leave free (orthonormal columns), z the coordinates of the structure.
+its constraints leave free (orthonormal columns), z the coordinates of the structure. Where constraints prescribe a
+motion s(t), q = q_0 + S z + s(t) (Reduction.displacement).
 """
 
 from __future__ import annotations
