@@ -34,7 +34,7 @@ from multiphi_exudyn.levels.level.static_response import (
 from multiphi_exudyn.mathematics.eigenproblems.modes import cluster_end
 from multiphi_exudyn.mathematics.response.coupled_response import modal_response
 from multiphi_exudyn.mathematics.response.free_response import ModalResponse, is_slow
-from multiphi_exudyn.mathematics.round_off import ZERO
+from multiphi_exudyn.mathematics.round_off import BALANCED, ZERO, drop_round_off
 from multiphi_exudyn.mechanics.structures.arguments import real_array
 
 if TYPE_CHECKING:
@@ -301,6 +301,16 @@ class Level(Shown):
         closed_directions = base.closed_directions(index, gaps)
         along, configuration, _ = self._response(closed_directions, load)
         return base.contact_forces(index, closed_directions, along, base.gaps_at(configuration, initial)), configuration
+
+    def driving_force(self, load: np.ndarray, gaps: np.ndarray) -> np.ndarray:
+        """Return the force (r,) that ``static_response`` leaves on zero-frequency modes, zero on the others."""
+        if self.vibrates:
+            return np.zeros(self.modes)
+        closed_directions = self.base.closed_directions(list(self.indices), gaps)
+        along, _, unbalanced = self._response(closed_directions, load)
+        sizes = np.abs(self.vectors).T @ (np.abs(load) + np.abs(closed_directions.vectors) @ np.abs(along))
+        driving = drop_round_off(self.vectors.T @ unbalanced, BALANCED / ZERO * sizes)
+        return np.where(self.squares, 0.0, driving)
 
     def _response(
         self, closed_directions: ClosedDirections, total: np.ndarray
