@@ -43,7 +43,7 @@ def _complete(result: StudyResult) -> bool:
 
 
 def _print_summary(result: StudyResult, folder: Path) -> None:
-    """The cheapest setting of every method for every tolerance, at its worst point of the axes; if not timed, errors."""
+    """The cheapest setting of every method for every tolerance, at its worst point of the axes; untimed, errors."""
     places = points(result) if result.rows else [{}]
     several = len(places) > 1
     everywhere = f" at all {len(places)} points" if several else ""
