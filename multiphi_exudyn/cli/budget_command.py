@@ -50,5 +50,6 @@ def _print_summary(values: dict[str, Any]) -> None:
                 continue
             for part in total["parts"]:
                 uncertainty = "unknown" if part["uncertainty"] is None else percent(part["uncertainty"])
-                print(f"  {part['cause']:40}  {percent(part['size']):>9}  uncertainty {uncertainty}")
+                larger = ", larger than the part" if part["significant"] is False else ""
+                print(f"  {part['cause']:40}  {percent(part['size']):>9}  uncertainty {uncertainty}{larger}")
             print(f"  {'total':40}  {percent(total['total']):>9}")

@@ -10,7 +10,7 @@ from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.accuracy.analysis import cheapest, points, words
 from multiphi_exudyn.study.accuracy.cases import load_study
 from multiphi_exudyn.study.accuracy.study import run_study
-from multiphi_exudyn.study.accuracy.study_findings import records, study_warnings
+from multiphi_exudyn.study.accuracy.study_findings import findings, records, study_warnings
 from multiphi_exudyn.study.accuracy.study_report import render_study
 from multiphi_exudyn.study.accuracy.study_result import StudyResult, csv_text
 from multiphi_exudyn.study.comparison.wording import percent, seconds, share, times
@@ -43,7 +43,7 @@ def _complete(result: StudyResult) -> bool:
 
 
 def _print_summary(result: StudyResult, folder: Path) -> None:
-    """The cheapest setting of every method for every tolerance, at its worst point of the axes, if it was timed."""
+    """The cheapest setting of every method for every tolerance, at its worst point of the axes; untimed, errors."""
     places = points(result) if result.rows else [{}]
     several = len(places) > 1
     everywhere = f" at all {len(places)} points" if several else ""
@@ -57,6 +57,8 @@ def _print_summary(result: StudyResult, folder: Path) -> None:
             numbers = f"{seconds(best['online_s']):>9}  {times(best['faster']):>12}  {percent(best['error']):>8}"
             worst = f"; worst at {words(best['at'])}" if several else ""
             print(f"  {best['method']:32}  {numbers}  {words(best['setting'])}{worst}")
+    if not result.timings:
+        print("", *findings(result)["outcome"], sep="\n")
     rows = result.rows + result.budgets
     failed = sum(row.status != "ok" for row in rows)
     for sentence in study_warnings(result):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 
@@ -161,6 +162,10 @@ def test_a_study_over_an_axis_prints_the_worst_of_its_points(scene, tmp_path, ca
     printed = capsys.readouterr().out
     assert "cheapest within 50 % at all 2 points" in printed
     assert "; worst at start.displacement = 0.02" in printed
+    untimed = write(tmp_path / "untimed.toml", STUDY | {"axes": axis, "timing": False})
+    assert cli.main(["study", untimed, "--on", "serial"]) == 0
+    printed = capsys.readouterr().out
+    assert re.search(r"levels \(r = 4\): error .* % in the median, at most .* %, at all 2 points", printed)
 
 
 def test_a_study_none_of_whose_settings_ran_has_exit_code_1(scene, tmp_path, capsys):
