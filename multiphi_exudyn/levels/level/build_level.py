@@ -19,10 +19,7 @@ __all__ = ["build_level"]
 
 UNDAMPED = 1e-12  # of the largest damping: round-off of projecting it
 NEUTRAL = 1e-12  # of mu: an |omega^2| below it is round-off of zero
-NEARLY_NEUTRAL = (
-    1e-7  # of the sum of the |stiffnesses| along a mode: a smaller rest changes the motion less than round-off of
-)
-#                        its static response does, which is the larger the smaller the rest
+NEARLY_NEUTRAL = 1e-7  # of the sum of |stiffnesses| along a mode: to drop a smaller rest costs less than round-off does
 
 
 def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = None) -> Level:
