@@ -262,7 +262,7 @@ class Level(Shown):
         rows : array (k, n), default None
             Rows that give the quantities to draw, such as deflections along a beam; None for all degrees of freedom.
         positions : array (k,), default None
-            Position [m] of each quantity; None for its number.
+            Position of each quantity, in any unit; None for its number.
 
         Raises
         ------
@@ -276,7 +276,7 @@ class Level(Shown):
         places = np.arange(len(shown)) if positions is None else real_array("positions", positions, "a (k,) array")
         if places.shape != (len(shown),):
             raise MultiPhiValueError(f"positions: got shape {places.shape}, need ({len(shown)},)")
-        label = ("degree of freedom" if rows is None else "row") if positions is None else "position [m]"
+        label = ("degree of freedom" if rows is None else "row") if positions is None else "position"
         return mode_figure(shown @ self.shapes[:, :count], self.frequencies[:count], places, label)
 
     def asymptotic(self, load: np.ndarray) -> Asymptotic:
