@@ -153,6 +153,19 @@ def test_a_slope_that_nearly_cancels_a_friction_spring(rest, velocity, bodies):
         assert abs(run.ledger.residual) < 1e-9
 
 
+@pytest.mark.parametrize("rest", [2e-7, 1e-6, 1e-5])
+def test_entering_a_nearly_neutral_level_moves_nothing(rest):
+    """The belt moves the equilibrium of that level at 1 / rest times its speed."""
+    structure = mp.LinearStructure(2.0 * np.eye(1), np.array([[5.0]]), points={"x": 0})
+    belt = mp.Friction("belt", "x", 0.5, stiffness=5.0 * (1 + rest), velocity=-1.0)
+    run = mp.simulate(
+        mp.MultiPhiModel(structure, [mp.ForceLaw("x", LAW, name="law"), belt]), 4.0, displacement=[0.2], velocity=[-1.0]
+    )
+    assert {event.contact for event in run.events} == {"law", "belt"}
+    for event in run.events:
+        assert_allclose(*(run.velocity(event.time, side) for side in ("left", "right")), rtol=0, atol=1e-8)
+
+
 def test_a_soft_spring_that_cancels_nothing_keeps_its_frequency():
     """It is as small beside the stiff ones as the rest of springs that cancel."""
     structure = mp.LinearStructure(np.eye(2), np.diag([1.0, 1e10]), None, {"soft": 0, "stiff": 1})

@@ -26,6 +26,8 @@ from multiphi_exudyn.mathematics.round_off import FOLLOWING, PRODUCT, ZERO, drop
 
 __all__ = ["Channels"]
 
+SMALL_DIFFERENCE = 1e-3  # of the sum of |stiffnesses| along a mode: a smaller omega^2 has lost three digits or more
+
 
 @dataclass(frozen=True)
 class Channels:
@@ -87,7 +89,12 @@ class Channels:
         carried, _ = _static_responses(level, unloaded, np.where(rigid[:, None], -stops, 0.0))
         centre = _centre(force, level.computed)
         loaded = drop_round_off(loaded, np.abs(level.vectors) @ np.abs(centre))  # zero if the level has all modes
-        modal = centre - _centre(force, level.squares) - _centre(level.vectors.T @ pushed, level.computed)
+        sprung, soft = _centre(level.vectors.T @ pushed, level.computed), _is_small_difference(level)
+        if np.any(soft):
+            sprung[soft] = (
+                level.vectors[:, soft].T @ _static_responses(level, unloaded, np.where(rigid[:, None], 0.0, -stops))[0]
+            )
+        modal = centre - _centre(force, level.squares) - sprung
         constant = slice(excitation.prescribed, None)  # motion is centred on the whole static response to these,
         force[:, constant], modal[:, constant] = 0.0, 0.0
         for k in range(excitation.prescribed, excitation.channels):  # and modes without a centre are driven
@@ -151,6 +158,15 @@ def _none(r: int, m: int, k: int) -> Channels:
 def _centre(force: np.ndarray, squares: np.ndarray) -> np.ndarray:
     """omega^-2 P (r, q), zero on zero-frequency modes."""
     return np.divide(force, squares[:, None], out=np.zeros_like(force), where=squares[:, None] != 0)
+
+
+def _is_small_difference(level: Level) -> np.ndarray:
+    """Return whether the omega^2 (r,) of each mode is a small difference of stiffnesses, and not zero.
+
+    It has few digits, and the static response, large in such a mode, is removed from the mode as it was computed.
+    """
+    sizes = level.base.stiffness_sizes(level.indices, level.vectors)
+    return np.asarray((np.abs(level.computed) <= SMALL_DIFFERENCE * sizes) & (level.computed != 0))
 
 
 def _static_responses(level: Level, loads: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

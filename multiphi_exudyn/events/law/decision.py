@@ -228,15 +228,20 @@ def classify_refusals(ints: Ints) -> int:
 
 @compiled
 def is_reversed_by_impact(ints: Ints, exit_number: int) -> int:
-    """Return 1 if an exit taken once is recovering in WORKED, but was armed before the instant in the same state."""
+    """Return 1 if an exit taken once is recovering in WORKED, but was not before an impact at this instant.
+
+    It was armed before the instant in the same state, or leads back to that state, which was left before the impact.
+    """
     level, before = ints[WORKED + LEVEL], ints[REACHED + LEVEL]
     exit_ = ints[level + EXITS] + exit_number * EXIT_INTS
     element = ints[exit_ + ELEMENT]
     waits = ints[ints[WORKED + PHASES] + exit_number] == RECOVERING and ints[exit_ + FIRMNESS] == TAKEN_ONCE
-    if not waits or ints[ints[before + STATES] + element] != ints[ints[level + STATES] + element]:
+    if not waits or is_return(ints, element, ints[exit_ + ASKED]) == 1:
         return 0
+    if ints[ints[before + STATES] + element] != ints[ints[level + STATES] + element]:
+        return 1 if ints[SPEEDS_CHANGED] == 1 and ints[ints[before + STATES] + element] == ints[exit_ + ASKED] else 0
     k = ints[ints[before + FIRST_EXITS] + element] + exit_number - ints[ints[level + FIRST_EXITS] + element]
-    return 1 if ints[ints[REACHED + PHASES] + k] == ARMED and is_return(ints, element, ints[exit_ + ASKED]) == 0 else 0
+    return 1 if ints[ints[REACHED + PHASES] + k] == ARMED else 0
 
 
 @compiled

@@ -269,6 +269,14 @@ class ModalBase(ElementTable, Shown):
         further = [i for i in members if math.isinf(self.stiffnesses[i])][1:]
         return [[i for i in members if i not in further], *([i] for i in further)]
 
+    def stiffness_sizes(self, closed: Sequence[int], vectors: np.ndarray) -> np.ndarray:
+        """Return the sums (r,) of |stiffnesses| of the structure and of closed springs along modes (m, r).
+
+        Of the stiffnesses themselves it is omega^2.
+        """
+        springs = np.where(np.isinf(self.stiffnesses[list(closed)]), 0.0, np.abs(self.stiffnesses[list(closed)]))
+        return np.asarray(self.squares @ vectors**2 + springs @ (self.directions[:, list(closed)].T @ vectors) ** 2)
+
     def contact_forces(
         self, closed: list[int], closed_directions: ClosedDirections, along: np.ndarray, gaps: np.ndarray
     ) -> np.ndarray:

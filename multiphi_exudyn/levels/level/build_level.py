@@ -19,10 +19,7 @@ __all__ = ["build_level"]
 
 UNDAMPED = 1e-12  # of the largest damping: round-off of projecting it
 NEUTRAL = 1e-12  # of mu: an |omega^2| below it is round-off of zero
-CANCELLED = (
-    1e-7  # of the sum of the |stiffnesses| along a mode: a smaller rest changes the motion less than round-off of
-)
-#                   its static response does, which is the larger the smaller the rest
+NEARLY_NEUTRAL = 1e-7  # of the sum of |stiffnesses| along a mode: to drop a smaller rest costs less than round-off does
 
 
 def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = None) -> Level:
@@ -103,8 +100,7 @@ def _cancelled(base: ModalBase, closed: Sequence[int], squares: np.ndarray, vect
     stiffnesses = base.stiffnesses[closed]
     if np.all(stiffnesses >= 0) or np.any(np.isinf(stiffnesses)) or any(i in base.oblique for i in closed):
         return np.zeros(len(squares), bool)
-    sizes = base.squares @ vectors**2 + np.abs(stiffnesses) @ (base.directions[:, closed].T @ vectors) ** 2
-    return np.asarray(np.abs(squares) <= CANCELLED * sizes)
+    return np.asarray(np.abs(squares) <= NEARLY_NEUTRAL * base.stiffness_sizes(closed, vectors))
 
 
 def _aligned_free_modes(
