@@ -342,13 +342,6 @@ class TestLastSample:
         _, found = run(expected[-1], elements=2, contacts=(), step=step, output_step=interval)
         np.testing.assert_array_equal(found.time, expected)
 
-    def test_steps_that_the_solver_halves(self):
-        """Near the round-off of the beam's iteration some steps are taken in halves."""
-        _, found = run(0.0715, elements=4, step=1e-4, newton_tolerance=3e-8)
-        assert found.status == "ok"
-        assert found.steps > 715
-        np.testing.assert_array_equal(found.time, 1e-4 * np.arange(716))
-
     def test_an_end_between_two_samples(self):
         _, found = run(0.01005, elements=2, contacts=(), step=1e-4)
         np.testing.assert_array_equal(found.time, 1e-4 * np.arange(101))
