@@ -26,6 +26,7 @@ from multiphi_exudyn.mechanics.loads.samples import Sampled
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.loads.time_functions import Harmonic, Smooth, Sweep
 from multiphi_exudyn.mechanics.structures.assembly import Assembly, assemble
+from multiphi_exudyn.mechanics.structures.condensed_structure import CondensedStructure, condensed_structure
 from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.structures.modal_structure import ModalStructure, structure_from_modes
 from multiphi_exudyn.mechanics.structures.structure import LinearStructure
@@ -45,6 +46,7 @@ __all__ = [
     "BaseMotion",
     "Beam",
     "Clamp",
+    "CondensedStructure",
     "ConstantLoad",
     "Equilibrium",
     "Event",
@@ -85,6 +87,7 @@ __all__ = [
     "UpTo",
     "__version__",
     "assemble",
+    "condensed_structure",
     "frequency_response",
     "load_trajectory",
     "planar_beam",

@@ -84,9 +84,14 @@ class TestAbaqus:
         assert_array_equal(found.mass.diagonal(), np.diag(MASS)[::-1][order])
         assert_array_equal(found.row("tip"), [0, 1, 0, 0])
 
-    def test_a_node_without_mass_is_named(self, saved, refused):
+    def test_a_node_without_mass_follows_statically(self, saved):
         files = saved("j_MASS1.mtx", nodal(MASS * (np.arange(N) != 3))), saved("j_STIF1.mtx", nodal(STIFFNESS))
-        refused(ValueError, "mass: diagonal entry 5 (uz of node 10) is 0", read_structure, *files)
+        found = read_structure(*files, points={"follows": (10, "uz")})
+        assert_array_equal(found.massless, [5])
+        assert found.dofs.rows[5] == (10, "uz")
+        assert_allclose(
+            found.row("follows"), [0, 0, 1 / 3, 0, 1 / 3, 1], rtol=1e-12
+        )  # between (10, "ux") and (7, "ux")
 
     def test_files_with_and_without_nodes_do_not_mix(self, saved, refused):
         files = saved("j_MASS1.mtx", coordinate(MASS)), saved("j_STIF1.mtx", nodal(STIFFNESS))

@@ -24,6 +24,7 @@ import scipy.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
+from multiphi_exudyn.mathematics.eigenproblems.massless_motions import not_definite
 from multiphi_exudyn.mathematics.orthonormal import scalar_product
 
 __all__ = [
@@ -235,7 +236,7 @@ def _shifted_modes(mass: np.ndarray, stiffness: np.ndarray, shift: float) -> Mod
     try:
         lower = scipy.linalg.cholesky(mass, lower=True)
     except scipy.linalg.LinAlgError as error:
-        raise MultiPhiValueError("mass: indefinite, need a positive definite matrix") from error
+        raise not_definite(mass) from error
     try:
         upper = scipy.linalg.cholesky(stiffness + shift * mass)
     except scipy.linalg.LinAlgError:

@@ -27,6 +27,7 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.files.array_files import ARRAY_READERS, npz_arrays, select_array
 from multiphi_exudyn.mechanics.files.text_matrices import NodalMatrix, harwell_boeing, lines_of, same_rows, triplets
 from multiphi_exudyn.mechanics.structures.arguments import Matrix
+from multiphi_exudyn.mechanics.structures.condensed_structure import condensed_structure
 from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.structures.dofs import DofTable, Place
 from multiphi_exudyn.mechanics.structures.structure import LinearStructure
@@ -99,7 +100,7 @@ def read_structure(
     Returns
     -------
     LinearStructure
-        The structure with these matrices.
+        The structure with these matrices; for a mass of lower rank a CondensedStructure, as by ``condensed_structure``.
 
     Raises
     ------
@@ -127,7 +128,7 @@ def read_structure(
         raise MultiPhiValueError("dofs: got a table beside files that name their nodes, need none")
     if isinstance(dofs, (str, os.PathLike)):
         dofs = _read("dofs", Path(dofs), "a readable table of nodes and components", _dof_rows)
-    return LinearStructure(
+    return condensed_structure(
         matrices["mass"],
         matrices["stiffness"],
         matrices.get("damping", damping),
