@@ -10,6 +10,7 @@ import scipy.io
 import scipy.sparse
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
 
 from multiphi_exudyn import MultiPhiError, MultiPhiModel, MultiPhiTypeError, MultiPhiValueError, read_structure
 from multiphi_exudyn.mechanics.files.matrix_files import read_array
@@ -54,6 +55,17 @@ def mass(tmp_path):
 
 
 class TestMatrices:
+    @pytest.mark.parametrize("triangle", ["lower", "upper", "both"])
+    @pytest.mark.parametrize("name", ["k.mtx", "k.mtx.gz"])
+    def test_of_a_banner_that_says_symmetric_are_not_doubled(self, tmp_path, triangle, name):
+        matrix = STIFFNESS.toarray()
+        kept = {"lower": np.tril(matrix), "upper": np.triu(matrix), "both": matrix}[triangle]
+        places = np.argwhere(kept)
+        entries = "".join(f"{i + 1} {j + 1} {kept[i, j]}\n" for i, j in places.tolist())
+        text = HEADER + f"real Symmetric\n% by hand\n{N} {N} {len(places)}\n{entries}".encode()
+        (tmp_path / name).write_bytes(gzip.compress(text, mtime=0) if name.endswith(".gz") else text)
+        assert_array_equal(read_array("stiffness", tmp_path / name).toarray(), matrix)
+
     @pytest.mark.parametrize("ending", ENDINGS)
     def test_are_those_that_were_written(self, tmp_path, ending):
         files = [write(tmp_path / f"{name}{ending}", a) for name, a in (("mass", MASS), ("stiffness", STIFFNESS))]

@@ -57,7 +57,8 @@ class LinearStructure(Shown):
     damping : array (n, n), ModalDamping, RayleighDamping or None, default None
         C [N s/m, N m s], symmetric positive semidefinite, or its definition by ratios; None for no damping.
     points : mapping of str to int, (int, str) or array (n,), default empty
-        Name to degree of freedom, counted from 0, to (node, component) or to row p; afterwards name to row.
+        Name to degree of freedom, counted from 0, or with dofs to (node, component), or to row p; afterwards name to
+        row.
     dofs : sequence of (int, str or int), default None
         (node, component) of every row of the matrices, "ux", "uy", "uz", "rx", "ry", "rz" or 1 to 6; None if unknown.
         Afterwards a DofTable.
