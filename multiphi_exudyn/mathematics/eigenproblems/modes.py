@@ -54,9 +54,9 @@ ROUND_OFF = 64 * np.finfo(float).eps  # of |phi|^T |K| |phi|: strain energy belo
 FIRST_SHIFT = 1e-8  # of the largest K_ii / M_ii: regularises K until the first elastic mode is known
 FEW_DIGITS_SHIFT = 1e-6  # the same for K of fewer than 53 bits
 FEWEST_DIGITS = 1e-5  # of |phi|^T |K| |phi|: more than the digits of any K that can be told leave unknown
-FAR = 1e-3  # of the first elastic omega^2: nearer rigid-body modes could be soft ones that K gives with too few digits
+FAR = 0.05  # of the first elastic omega^2: what the digits leave open of rigid-body modes is at most this
 NO_ENERGY = 1e-9  # of ROUND_OFF: exact strain energy of a rigid-body mode, which is round-off of its shape, squared
-SOFT = 1e-7  # round-off of omega^2 above which a mode is soft beside its strain energies
+SOFT = 1e-10  # round-off of omega^2 above which a mode is soft beside its strain energies
 ALONE = 0.5  # of omega^2 of the next mode: soft modes up to such a gap are made exact together
 REFINEMENTS = 3  # each squares the error that other modes leave in soft ones
 EQUAL = 1e-11  # of omega^2: nearer ones are equal up to the round-off of matrices and eigenvalues
@@ -100,12 +100,16 @@ def complete_modes(mass: np.ndarray, stiffness: np.ndarray) -> Modes:
             break
     if modes is None:
         lowest = scipy.linalg.eigh(stiffness, mass, eigvals_only=True, subset_by_index=[0, 0])[0]
-        raise MultiPhiValueError(
-            f"stiffness: indefinite, lowest eigenvalue omega^2 = {lowest:g}; need a positive semidefinite matrix"
-        )
+        raise _indefinite(lowest)
     if 0 < modes.rigid < modes.count:
         modes = _shifted_modes(mass, stiffness, modes.omega[modes.rigid] ** 2) or modes
     return _with_exact_soft_modes(mass, stiffness, modes)
+
+
+def _indefinite(lowest: float) -> MultiPhiValueError:
+    return MultiPhiValueError(
+        f"stiffness: indefinite, lowest eigenvalue omega^2 = {lowest:g}; need a positive semidefinite matrix"
+    )
 
 
 def _with_exact_soft_modes(mass: np.ndarray, stiffness: np.ndarray, modes: Modes) -> Modes:
@@ -145,7 +149,10 @@ def _with_soft_ones_among_rigid(stiffness: np.ndarray, modes: Modes) -> Modes:
     """Return the modes with a frequency for those without one whose exact strain energy is not zero."""
     own = modes.shapes[:, : modes.rigid]
     squares, rotation = scipy.linalg.eigh(own.T @ doubled_product(stiffness, own))
-    soft = squares > NO_ENERGY * np.max(round_off_energy(stiffness, own), initial=0.0)
+    none = NO_ENERGY * np.max(round_off_energy(stiffness, own), initial=0.0)
+    if np.any(squares < -none):
+        raise _indefinite(float(squares[0]))
+    soft = squares > none
     omega, shapes = modes.omega.copy(), modes.shapes.copy()
     omega[: modes.rigid], shapes[:, : modes.rigid] = np.sqrt(np.where(soft, squares, 0.0)), own @ rotation
     return Modes(omega, shapes, modes.rigid - int(np.sum(soft)))
@@ -317,8 +324,8 @@ def modes_from_squares(stiffness: Any, omega_squared: np.ndarray, shapes: np.nda
 def rigid_modes(stiffness: Any, squares: np.ndarray, shapes: np.ndarray, shift: float = 0.0) -> np.ndarray:
     """Return which modes (m,) are rigid-body modes: without strain energy, but for round-off and the digits of K.
 
-    Those of a K of few digits have to lie far below the first elastic mode. squares: omega^2 (m,), with the round-off of
-    ``shift``.
+    What few digits leave open of omega^2 has to lie far below the first elastic one. squares: omega^2 (m,), with the
+    round-off of ``shift``.
     """
     sizes = round_off_energy(stiffness, shapes)
     rigid = np.asarray(squares <= sizes + ROUND_OFF * shift)

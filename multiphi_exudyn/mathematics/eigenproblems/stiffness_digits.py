@@ -2,9 +2,9 @@
 
     omega^2 = phi.K phi,   error of omega^2 = sum_v S_v d_v,   S_v = sum of phi_i phi_k over the entries +-v of K
 
-Every value v of K is known up to half a unit of its last digit, |d_v| <= u_v / 2: of 53 bits, of 24 in single precision,
-or of the decimals with which a program printed it. With errors d_v that are independent of each other and uniform,
-omega^2 has the standard deviation sigma, sigma^2 = sum_v (S_v u_v)^2 / 12. Equal values have equal errors.
+Every value v of K is known up to half a unit of its last digit, |d_v| <= u_v / 2: of 53 bits, of 24 in single
+precision, or of the decimals with which a program printed it. With errors d_v that are independent of each other and
+uniform, omega^2 has the standard deviation sigma, sigma^2 = sum_v (S_v u_v)^2 / 12. Equal values have equal errors.
 
 A soft mode beside stiff springs is a small difference of large energies. Products of K with it are therefore formed
 in twice the precision (T. J. Dekker, Numer. Math. 18 (1971) 224), and first-order perturbations by the other modes make
@@ -13,6 +13,7 @@ it exact for the numbers that K holds.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -57,7 +58,7 @@ def digits_of(matrix: Any) -> Digits | None:
         scaled = distinct / _unit(distinct, count)
         if _are_integers(scaled):
             is_used = float(np.mean(np.round(scaled) % 10 != 0)) >= USED
-            return Digits(f"{count} digits", lambda v: _unit(v, count)) if is_used else None
+            return Digits(f"{count} digits", functools.partial(_unit, count=count)) if is_used else None
     return None
 
 
@@ -71,7 +72,7 @@ def is_exact(matrix: np.ndarray) -> bool:
 
 
 def energy_noise(stiffness: Any, shapes: np.ndarray, digits: Digits | None = None) -> np.ndarray:
-    """Return the largest error (m,) of omega^2 of shapes (n, m) by what the digits of K leave unknown; None: 53 bits."""
+    """Return the largest error (m,) of omega^2 of shapes (n, m) that the digits of K leave open; None: 53 bits."""
     upper = scipy.sparse.triu(scipy.sparse.coo_array(stiffness)).tocoo()
     distinct, groups = np.unique(np.abs(upper.data), return_inverse=True)
     unit = np.spacing(distinct) if digits is None else digits.unit(np.where(distinct > 0, distinct, 1.0))
