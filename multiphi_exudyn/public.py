@@ -22,7 +22,7 @@ from multiphi_exudyn.mechanics.elements.friction import Friction
 from multiphi_exudyn.mechanics.files.matrix_files import read_structure
 from multiphi_exudyn.mechanics.loads.loads import FunctionLoad, HarmonicLoad, SampledLoad, SweepLoad
 from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion
-from multiphi_exudyn.mechanics.loads.samples import Sampled
+from multiphi_exudyn.mechanics.loads.samples import Accelerogram, Sampled
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.loads.time_functions import Harmonic, Smooth, Sweep
 from multiphi_exudyn.mechanics.structures.assembly import Assembly, assemble
@@ -42,6 +42,7 @@ from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from multiphi_exudyn.version import __version__
 
 __all__ = [
+    "Accelerogram",
     "Assembly",
     "BaseMotion",
     "Beam",
