@@ -22,6 +22,7 @@ __all__ = ["stiffness_warnings"]
 
 UNCERTAIN = 1e-3  # of omega^2: what the digits may leave open without a warning
 RESOLVED = 8.0  # times what the digits leave open: assembled free structures have at most 2
+SHAPES = 0.02  # of the energy that counts as round-off: what the round-off of rigid-body shapes stays below
 LOWEST = 8  # elastic modes that are judged: higher ones are stiffer
 
 
@@ -39,9 +40,11 @@ def stiffness_warnings(stiffness: Any, modes: Modes) -> Iterator[str]:
                 f"{math.sqrt(np.max(squares)) / 2 / math.pi:.2g} Hz{first}; they are taken as free; if a soft "
                 "suspension holds the structure, give the stiffness with all its digits"
             )
-    if digits is None and modes.rigid and not scipy.sparse.issparse(stiffness):
+    is_rounded = digits is None and not scipy.sparse.issparse(stiffness) and not is_exact(stiffness)
+    if is_rounded and modes.rigid:
         squares = np.einsum("ij,ij->j", rigid, doubled_product(stiffness, rigid))
-        if np.any(squares > RESOLVED * energy_noise(stiffness, rigid)):
+        least = np.maximum(RESOLVED * energy_noise(stiffness, rigid), SHAPES * round_off_energy(stiffness, rigid))
+        if np.any(squares > least):
             yield (
                 f"digits: a mode of {math.sqrt(np.max(squares)) / 2 / math.pi:.3g} Hz, the difference of far stiffer "
                 "springs, is taken as a rigid-body one, as 16 digits of the stiffness hardly hold it; tie rigidly what "

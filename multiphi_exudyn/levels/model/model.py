@@ -249,16 +249,18 @@ class MultiPhiModel(SharedBase, Shown):
         forces : mapping of str to float
             Point to force [N], along the point's positive displacement.
         inertia_relief : bool, default False
-            For a structure with rigid-body modes: whether the forces may accelerate it; with False they have to balance
-            each other. The result is its deformation, M-orthogonal to those modes.
+            For a structure with rigid-body modes: whether the forces may accelerate it; the result is its deformation,
+            M-orthogonal to those modes. With False they have to balance each other, or its contacts have to carry them:
+            then it rests on these, without moving in directions that neither forces nor contacts determine.
 
         Raises
         ------
         MultiPhiTypeError
             For forces that are no mapping.
         MultiPhiValueError
-            For a structure with rigid-body modes under unbalanced forces, with force laws or friction, or with contacts
-            that close; for rigid contacts that exclude each other, and for unknown points.
+            For a structure with rigid-body modes under unbalanced forces that its contacts cannot carry, under balanced
+            ones that press it on contacts, or with force laws or friction; for rigid contacts that exclude each other,
+            and for unknown points.
         NumericalFailure
             Where the structure snaps through on the way, friction slips with a jump, or contacts wedge.
 
