@@ -21,7 +21,7 @@ from multiphi_exudyn.mechanics.structures.arguments import Matrix
 from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.structures.structure import LinearStructure
 
-__all__ = ["build_base"]
+__all__ = ["COMPLETE", "build_base"]
 
 BEYOND = 8  # modes of an incomplete base beyond those of a level
 COMPLETE = 600  # DoFs up to which the base holds every mode; above, the lowest ones and Krylov vectors
