@@ -1,8 +1,8 @@
 """BLAS threads: one while many small matrices are computed, for which threads cost far more than they save.
 
-On a busy machine each call of BLAS waits for its slowest thread. To set their number takes some 0.1 ms, a level several:
-it is set around whole levels, by the outermost of nested uses, and in the main thread alone, as OpenBLAS does not
-restore it from others.
+On a busy machine each call of BLAS waits for its slowest thread. To set their number takes some 0.1 ms, a level
+several: it is set around whole levels, by the outermost of nested uses, and in the main thread alone, as OpenBLAS
+does not restore it from others.
 """
 
 from __future__ import annotations

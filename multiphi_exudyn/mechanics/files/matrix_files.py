@@ -64,10 +64,31 @@ FIRST_BYTES = {  # of files, with their type and usual extension
     b"\x89HDF": "HDF5, of MATLAB 7.3, .mat",
     b"\x1f\x8b": "a packed file, .mtx.gz",
 }
+UNIVERSAL = (
+    "a universal file: its modes with pyuff: sets = pyuff.UFF(file).read_sets(); structure_from_modes(frequencies, "
+    "shapes, masses) of the sets of type 55"
+)
+HDF5 = "an HDF5 file: arrays of h5py.File(file) are arguments of LinearStructure; one of MATLAB 7.3 ends in .mat"
+TEXT = "numbers in text: LinearStructure(numpy.loadtxt(file, delimiter=','), ...), or as .mtx row, column, value"
 OTHER_FILES = {  # other files of programs, and what to write instead
-    ".full": "an Ansys .full file: write its matrices by HBMAT",
+    ".full": "an Ansys .full file: write its matrices by HBMAT, or with ansys-mapdl-reader: dofs, k, m = "
+    "reader.read_binary(file).load_km(); LinearStructure(m + triu(m, 1).T, k + triu(k, 1).T)",
+    ".rst": "Ansys results: write the matrices of .full by HBMAT, or with ansys-mapdl-reader: rst = "
+    "reader.read_binary(file); structure_from_modes(rst.time_values, shapes) of rst.nodal_solution(i)",
+    ".cdb": "an Ansys model: write its matrices by HBMAT",
+    ".h5": HDF5,
+    ".hdf5": HDF5,
+    ".csv": TEXT,
+    ".txt": TEXT,
+    ".unv": UNIVERSAL,
+    ".uff": UNIVERSAL,
+    ".frd": "CalculiX results: *FREQUENCY, SOLVER=MATRIXSTORAGE writes .sti and .mas",
+    ".med": "Code_Aster results: values, i, j, n = matrix.EXTR_MATR(sparse=True) in its command file; "
+    "LinearStructure(...) of scipy.sparse.csr_array((values, (i, j)), (n, n))",
+    ".rmed": "Code_Aster results: give its matrices, matrix.EXTR_MATR(sparse=True) in its command file",
     ".op2": "Nastran results: write the matrices by OUTPUT4, .op4",
-    ".pch": "a Nastran punch file: write the matrices by OUTPUT4, .op4",
+    ".pch": "a Nastran punch file: write the matrices by OUTPUT4, .op4, or of DMIG with pyYeti: tables = "
+    "pyyeti.nastran.bulk.rddmig(file); LinearStructure(tables['MAAX'].values, tables['KAAX'].values)",
     ".bdf": "a Nastran model: write its matrices by OUTPUT4, .op4",
     ".inp": "an Abaqus or CalculiX model: *MATRIX GENERATE and *MATRIX OUTPUT write .mtx",
     ".odb": "Abaqus results: *MATRIX GENERATE and *MATRIX OUTPUT write .mtx",
