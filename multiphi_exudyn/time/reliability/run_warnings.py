@@ -17,6 +17,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held, and
                               the energy lost with it
     "lost energy: ..."        energy lost to truncation, of the largest of the run, where displacements hold
+    "digits: ..."             rigid-body modes, or frequencies, that the digits of the stiffness leave open
     "undamped modes: ..."     modes for which a list of modal ratios has none
     "damping ratios: ..."     ratios that look like per cent
     "missing modes: ..."      contacts of a structure of modes alone, where its static flexibility is not known
@@ -59,6 +60,7 @@ from multiphi_exudyn.time.warnings.model_warnings import (
     advised,
     cluster_warnings,
     damping_warnings,
+    digit_warnings,
     missing_modes,
     static_warnings,
 )
@@ -141,7 +143,7 @@ class ModelWarnings:
             any(contact.rigid for contact in model.contacts),
             spread_contacts(model),
             model.general or model.validity is not None or bool(approximated_laws(model)),
-            (*damping_warnings(model), *missing_modes(model), *static),
+            (*digit_warnings(model), *damping_warnings(model), *missing_modes(model), *static),
             tuple(cluster_warnings(levels)),
             fastest,
             slowest,
@@ -191,7 +193,7 @@ class RunSummary:
 
 def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
     """Warnings of a run in Exudyn, from its levels and losses."""
-    sentences = [*damping_warnings(model), *missing_modes(model)]
+    sentences = [*digit_warnings(model), *damping_warnings(model), *missing_modes(model)]
     if not model.whole:
         sentences.extend(static_warnings(run.levels))
         sentences.extend(energy_warning(lost_share(abs(run.truncated), run.energy)))
