@@ -96,7 +96,8 @@ class DashpotStops:
         self.largest = np.zeros(2 * self.n)
         self.grow(z)
         depth, force = self.depths_and_forces(z)
-        modes = np.where(depth > 0, np.where(force > 0, PUSHES, INSIDE), AWAY)
+        modes = np.where(depth > 0, INSIDE, AWAY)
+        modes[(depth >= -self.slack) & (force > self.force_slack)] = PUSHES
         values = np.zeros((2 * self.n, steps + 1))
         values[:, 0] = z[: 2 * self.n]
         for k in range(1, steps + 1):
