@@ -47,7 +47,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.events.states.flow import expand
 from multiphi_exudyn.events.states.signal_flow import signal_sizes, signal_waves
-from multiphi_exudyn.events.states.signals import held_part, mapped_size, rate_sign, row_sign
+from multiphi_exudyn.events.states.signals import held_part, held_size, mapped_size, rate_sign, row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.search.zero_crossing import first_sign
 from multiphi_exudyn.mechanics.elements.element import ALWAYS_TAKEN, MAY_RECOVER, TAKEN_ONCE
@@ -92,10 +92,10 @@ def becomes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal: int,
     expand(ints, numbers, waves, state)
     signal_waves(ints, numbers, waves, state, signal, ints[WORK_WAVES])
     signal_sizes(ints, numbers, waves, state, signal, ints[SEARCH_NUMBERS])
-    constant = numbers[ints[signal + ROW] + 2 * n] + held_part(ints, numbers, state, signal)
-    basis = ints[FLOW_BASIS]
+    own, held = numbers[ints[signal + ROW] + 2 * n], held_part(ints, numbers, state, signal)
+    size = abs(own) + held_size(ints, numbers, state, signal)
     return first_sign(
-        ints, numbers, waves, basis, ints[WORK_WAVES], constant, ints[SEARCH_NUMBERS], since,
+        ints, numbers, waves, ints[FLOW_BASIS], ints[WORK_WAVES], own + held, size, ints[SEARCH_NUMBERS], since,
         ints[SEARCH_NUMBERS] + ints[FLOW_COUNT], ints[SEARCH_WAVES],
     )  # fmt: skip
 

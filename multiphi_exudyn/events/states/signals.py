@@ -26,7 +26,7 @@ from multiphi_exudyn.events.states.state_arrays import accelerate, acceleration_
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.round_off import ZERO
 
-__all__ = ["gap", "held_part", "mapped_size", "rate_sign", "row_sign", "sign_of"]
+__all__ = ["gap", "held_part", "held_size", "mapped_size", "rate_sign", "row_sign", "sign_of"]
 
 
 @compiled
@@ -116,6 +116,16 @@ def held_part(ints: Ints, numbers: Numbers, state: int, signal: int) -> float:
     first, total = ints[ints[state + LEVEL] + MODES] + ints[PRESCRIBED], 0.0
     for k in range(first, first + held):
         total += numbers[ints[signal + ROW] + k] * numbers[ints[state + PLACE] + k]
+    return total
+
+
+@compiled
+def held_size(ints: Ints, numbers: Numbers, state: int, signal: int) -> float:
+    """Return the size of the terms of that part."""
+    held = ints[CHANNELS] - ints[PRESCRIBED]
+    first, total = ints[ints[state + LEVEL] + MODES] + ints[PRESCRIBED], 0.0
+    for k in range(first, first + held):
+        total += abs(numbers[ints[signal + ROW] + k] * numbers[ints[state + PLACE] + k])
     return total
 
 
