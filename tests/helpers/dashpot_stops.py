@@ -112,7 +112,8 @@ class DashpotStops:
                     trial = part @ z if self.step / 2**half <= left else None
                     if trial is not None and self.holds(modes, trial):
                         z, left = trial, left - self.step / 2**half
-                z, left = halves[-1] @ z, left - self.step / 2 ** (HALVINGS - 1)
+                beyond = max(half for half, part in enumerate(halves) if not self.holds(modes, part @ z))
+                z, left = halves[beyond] @ z, max(left - self.step / 2**beyond, 0.0)
                 after = self.modes_after(modes, z)
                 changes += int(np.any(after != modes))
                 modes, halves = after, self.halves(after == PUSHES)

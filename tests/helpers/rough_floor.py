@@ -91,7 +91,8 @@ class RoughFloor:
                     trial = part @ z if self.step / 2**half <= left else None
                     if trial is not None and self.after(s, trial) == s:
                         z, left = trial, left - self.step / 2**half
-                z, left = halves[-1] @ z, left - self.step / 2 ** (HALVINGS - 1)
+                beyond = max(half for half, part in enumerate(halves) if self.after(s, part @ z) != s)
+                z, left = halves[beyond] @ z, max(left - self.step / 2**beyond, 0.0)
                 changes += 1
                 if s and self.after(s, z) == 0:  # its slip ends: it sticks, or reverses
                     s = self.after(0, z)

@@ -50,7 +50,7 @@ from multiphi_exudyn.events.states.signal_flow import signal_sizes, signal_waves
 from multiphi_exudyn.events.states.signals import held_part, held_size, mapped_size, rate_sign, row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.search.zero_crossing import first_sign
-from multiphi_exudyn.mechanics.elements.element import ALWAYS_TAKEN, MAY_RECOVER, TAKEN_ONCE
+from multiphi_exudyn.mechanics.elements.element import ALWAYS_TAKEN, MAY_RECOVER, NEVER_RECOVERS, TAKEN_ONCE
 
 __all__ = [
     "arm_return_exits",
@@ -70,8 +70,8 @@ __all__ = [
 @compiled
 def phase_of(ints: Ints, numbers: Numbers, waves: Waves, state: int, exit_: int) -> int:
     """1, 5. ARMED where s is or becomes positive, RECOVERING where it is negative and may rise, else REFUSED."""
-    signal, mapped = exit_ + SIGNAL, 0.0
-    if ints[exit_ + FIRMNESS] == ALWAYS_TAKEN:  # a reaction; gaps and velocities are the same in both levels
+    signal, mapped, firmness = exit_ + SIGNAL, 0.0, ints[exit_ + FIRMNESS]
+    if firmness in (ALWAYS_TAKEN, NEVER_RECOVERS):  # a reaction, or what may not be negative by round-off
         mapped = mapped_size(ints, numbers, state, signal, 0)
     value = row_sign(ints, numbers, state, signal, mapped)
     if value > 0:
@@ -81,7 +81,7 @@ def phase_of(ints: Ints, numbers: Numbers, waves: Waves, state: int, exit_: int)
         rate = becomes(ints, numbers, waves, state, signal, 2)
     if value == 0 and rate >= 0:
         return ARMED
-    recovers = ints[exit_ + FIRMNESS] == MAY_RECOVER or ints[exit_ + FIRMNESS] >= TAKEN_ONCE
+    recovers = firmness == MAY_RECOVER or firmness >= TAKEN_ONCE
     return RECOVERING if rate > 0 and recovers else REFUSED
 
 
