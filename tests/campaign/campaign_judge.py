@@ -12,6 +12,7 @@ import numpy as np
 from campaign_scenes import later, scaled
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.study.stability.law_check import broken_laws
 from multiphi_exudyn.study.stability.run_laws import complaints
 from reference_models.body_alone import solve_body_alone
 
@@ -48,7 +49,8 @@ MIDDLE = 0.437  # of the run, where that ends and goes on
 class Motion:
     """x, x' (n, k) in the scene's own numbers up to where the run came, its events, and the impulse of its contacts.
 
-    rubbed: energy [J] that friction has lost, None where brute force does not say.
+    given: loads, x and x' of each of the runs. rubbed: energy [J] that friction has lost, None where brute force does
+    not say.
 
     scale: a length [m] and a speed [m/s] of the scene; motion below a millionth of them counts as none.
     """
@@ -62,6 +64,7 @@ class Motion:
     runs: tuple
     scale: tuple[float, float] = (0.0, 0.0)
     rubbed: float | None = 0.0
+    given: tuple = ()
 
 
 def instants(scene):
@@ -83,9 +86,10 @@ def native(scene):
     """The package's answer; where the scene is split, every part begins at the end of the one before."""
     model, t_end, x, v, loads = scaled(scene)
     time, length, _ = (2.0**power for power in scene.units)
-    runs, columns, first = [], [], 0.0
+    runs, given, columns, first = [], [], [], 0.0
     for last in (*(t * time for t in scene.split), t_end):
-        run = mp.simulate(model, last - first, x, v, [later(load, first) for load in loads])
+        given.append(([later(load, first) for load in loads], x, v))
+        run = mp.simulate(model, last - first, x, v, given[-1][0])
         runs.append(run)
         wanted = instants(scene) * time - first
         wanted = wanted[(wanted >= 0) & (wanted <= run.t_end) & (wanted < last - first)] if run.segments else []
@@ -98,7 +102,7 @@ def native(scene):
     places, speeds = (np.hstack([c[k] for c in columns]) if columns else np.zeros((n, 0)) for k in (0, 1))
     events = sum(len(run.events) for run in runs)
     motion = Motion(runs[-1].status, runs[-1].message, places, speeds, events, _impulse(scene, runs), tuple(runs))
-    return replace(motion, rubbed=_rubbed(scene, runs))
+    return replace(motion, given=tuple(given), rubbed=_rubbed(scene, runs))
 
 
 def _rubbed(scene, runs):
@@ -137,7 +141,11 @@ def _verdicts(scene, motion):
         return [("chatter", motion.message)], motion
     if motion.status != "ok":
         return [("named failure", motion.message)], motion
-    found = [(f"failure: {text.split(':')[0]}", text) for run in motion.runs for text in laws_of(scene, run)]
+    found = [
+        (f"failure: {text.split(':')[0]}", text)
+        for run, given in zip(motion.runs, motion.given, strict=True)
+        for text in laws_of(scene, run, *given)
+    ]
     compared, scale = _compared(scene, motion)
     found += [("told" if kind == "failure: wrong" and told(motion) else kind, text) for kind, text in compared]
     rubs = scene.system is not None and scene.system.sliders
@@ -155,10 +163,11 @@ def told(motion):
     return any(text.startswith(NOT_UNIQUE) for run in motion.runs for text in run.warnings)
 
 
-def laws_of(scene, run):
-    """What must hold of every run (study/stability/run_laws.py)."""
+def laws_of(scene, run, loads, x, v):
+    """What must hold of every run (study/stability, run_laws.py and law_check.py)."""
     time, length, mass = (2.0**power for power in scene.units)
-    return complaints(run, joule=mass * (length / time) ** 2, metre=length, varying=not _constant(scene))
+    found = complaints(run, joule=mass * (length / time) ** 2, metre=length, varying=not _constant(scene))
+    return [*found, *broken_laws(run, loads, (x, v))]
 
 
 def _constant(scene):

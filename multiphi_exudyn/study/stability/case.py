@@ -64,6 +64,15 @@ class Problem:
         return MultiPhiModel(self.structure, self.contacts, modes=self.modes)
 
     @property
+    def start(self) -> tuple[np.ndarray, np.ndarray]:
+        """x, x' (n,) at the start."""
+        rest = np.zeros(self.structure.n)
+        return (
+            rest if self.displacement is None else self.displacement,
+            rest if self.velocity is None else self.velocity,
+        )
+
+    @property
     def parts(self) -> list[UnilateralContact | ForceLaw]:
         """The contacts and force laws, without friction."""
         return [contact for contact in self.contacts if not isinstance(contact, Friction)]

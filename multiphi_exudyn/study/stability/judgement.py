@@ -35,6 +35,7 @@ from multiphi_exudyn.study.stability.brute_force import (
     truncated,
 )
 from multiphi_exudyn.study.stability.case import Problem
+from multiphi_exudyn.study.stability.law_check import broken_laws
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["BEYOND", "Judgement", "judge"]
@@ -54,7 +55,7 @@ class Judgement:
 
     truncated: whether a level has fewer modes than the structure has motions. unexcused: the part of ``beyond`` that no
     phase excuses. open_depth: deepest negative gap of an open contact. reported: the same, as the trajectory tells it.
-    laws: complaints. covered, samples: of the brute force.
+    laws: complaints of run_laws.py and law_check.py. covered, samples: of the brute force.
     """
 
     laws: tuple[str, ...]
@@ -105,7 +106,10 @@ def judge(problem: Problem, trajectory: Trajectory, budget: int) -> Judgement:
     judged = run_laws.still(trajectory) and not problem.driven
     rise = _share(run_laws.energy_rise(trajectory, ends), largest) if judged else residual
     return Judgement(
-        laws=tuple(run_laws.complaints(trajectory, joule=small, metre=small, varying=problem.driven, budget=budget)),
+        laws=(
+            *run_laws.complaints(trajectory, joule=small, metre=small, varying=problem.driven, budget=budget),
+            *broken_laws(trajectory, problem.loads, problem.start),
+        ),
         energy=rise,
         residual=residual,
         events=len(trajectory.events),

@@ -1,0 +1,599 @@
+"""Law check: the laws of mechanics and of contact at random instants of a trajectory, without any reference.
+
+    broken = broken_laws(trajectory, loads, start=(x0, v0))   # [] where every law holds, else one sentence for each
+
+What is checked, at a few instants of the segments and at a few events, always the same ones of the same run:
+
+    motion      M x'' + C x' + K x - f - sum h N + sum h_t T = 0,   x' and x'' the derivatives of x
+    contact     rigid     N >= 0, g >= 0, N g = 0, N g' = 0          g = h.x + gap - z(t)
+                compliant N = k max(0, -g);   viscous N = max(0, -k g - c g') where g < 0, else 0
+    friction    |T| <= mu_s N;   T s >= 0 and |T| = mu N where the patch slips, with s = (h_t.x - v t - T/k)'
+    force law   N = -F(q)
+    instants    x never jumps;   M (x'+ - x'-) = sum h p - sum h_t q,   p >= 0, |q| <= mu p, q of rigid contacts alone
+                g'+ >= 0, for a contact struck once without friction g'+ = -e g'-;   without impulse x' does not jump
+    energy      the ledger is closed, its rows impact, damping and friction are not negative, and its first and last
+                energies are those of x and x'
+
+Of a truncated model: the equation of motion projected onto the modes of the level, N >= 0 of rigid and viscous
+contacts, |T| <= mu_s N, a closed ledger with these rows. The check shares with the loop what the trajectory tells
+through ``displacement``, ``velocity``, ``acceleration``, ``gap``, ``contact_force``, ``friction_force``, ``events`` and
+``ledger``, and nothing else: matrices, contacts and loads are those that the model was given.
+
+Every bound is relative to the absolute values of the terms that are summed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse
+from scipy.optimize import lsq_linear
+
+from multiphi_exudyn.events.transitions.state import event_table
+from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
+from multiphi_exudyn.mechanics.elements.element import Element
+from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
+from multiphi_exudyn.mechanics.elements.friction import Friction
+from multiphi_exudyn.mechanics.loads.loads import Load
+from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
+from multiphi_exudyn.mechanics.loads.time_functions import Harmonic
+from multiphi_exudyn.mechanics.structures.damping import ModalDamping
+from multiphi_exudyn.mechanics.structures.structure import damping_matrix
+from multiphi_exudyn.study.stability.given_motions import approximated, forces_at, stop_motion
+from multiphi_exudyn.time.segments.segment import as_segments
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+
+__all__ = ["broken_laws"]
+
+INTERVALS = 20  # short intervals within segments, on each of which the laws are checked at NODES instants
+NODES = 6  # of Gauss quadrature, which integrates over an interval of at most one radian exactly
+EVENTS = 20  # instants of events, and as many ends of segments
+EXACT = 1e-8  # of the terms of a sum: larger is no round-off
+INTERPOLATED = 1e-4  # the same where a load is interpolated: its tolerance holds for the motion, not for the force
+FAR = 1e-2  # of the largest displacement: its round-off is that of what other masses do not move
+MOVES = 1e-6  # of the largest velocity: slower slip has no direction
+ENERGY = 1e-8  # of the energies turned over
+NO_MOTION = 1e-6  # of what the forces could move a free mass during the run: less is no motion
+TOUCHES = 1e-13  # of a gap's terms: less is none
+BOUNCE = 1e-11  # of the largest displacement: a lower bounce may be no more resolved
+SHORTEST = 1e-10  # of the run: a shorter segment is not looked into
+
+
+def broken_laws(
+    trajectory: Trajectory,
+    loads: Sequence[Load] = (),
+    start: tuple[np.ndarray, np.ndarray] | None = None,
+    intervals: int = INTERVALS,
+    seed: int = 0,
+) -> list[str]:
+    """The laws that a run breaks, one sentence each with an instant and by how much; empty if it obeys all.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The run, also the part of a failed one before its failure.
+    loads : sequence of loads
+        Those of the run.
+    start : (array (n,), array (n,)), default None
+        x, x' [m, m/s] that the run was given, to check what happens at the start; None: not checked.
+    intervals : int
+        How many short intervals within segments are looked at.
+    seed : int
+        Of the random instants.
+
+    Returns
+    -------
+    list of str
+        "law: name off by ... of its terms at t = ... s".
+    """
+    if not trajectory.segments:
+        return []
+    run = _Run(trajectory, tuple(loads), start)
+    inside = run.inside(intervals, np.random.default_rng(seed))
+    found: list[str] = []
+    if inside is not None:
+        object.__setattr__(inside, "terms", _force_terms(run, inside))
+        for check in (_motion, _derivatives, _contacts, _frictions, _laws):
+            found += check(run, inside)
+    return [*found, *_instants(run), *_energies(run, inside)]
+
+
+@dataclass(frozen=True)
+class _Inside:
+    """Intervals (k, 2) [s] within segments, their Gauss nodes times (k * NODES,) and weights, and there x, x', x''.
+
+    contact, friction: N or -F, and T (k * NODES,) by names. terms: absolute ones of the equation of motion.
+    """
+
+    ends: np.ndarray
+    times: np.ndarray
+    weights: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    x_ends: np.ndarray
+    v_ends: np.ndarray
+    contact: dict[str, np.ndarray]
+    friction: dict[str, np.ndarray]
+    terms: np.ndarray = field(init=False)
+
+    def worst(self, values: np.ndarray) -> np.ndarray:
+        """Largest absolute value (..., k * NODES) on the interval of every node, its ends not included."""
+        shaped = np.abs(values).reshape(*values.shape[:-1], -1, NODES)
+        return np.repeat(np.max(shaped, axis=-1), NODES, axis=-1)
+
+    def per_interval(self, values: np.ndarray) -> np.ndarray:
+        """Integral (..., k) over each interval of values (..., k * NODES) at the nodes."""
+        return (values * self.weights).reshape(*values.shape[:-1], -1, NODES).sum(axis=-1)
+
+
+class _Run:
+    """A trajectory with what it was given: matrices, rows and forces."""
+
+    def __init__(
+        self, trajectory: Trajectory, loads: tuple[Load, ...], start: tuple[np.ndarray, np.ndarray] | None
+    ) -> None:
+        self.trajectory, self.loads, self.start = trajectory, loads, start
+        self.structure, self.elements = trajectory.model.structure, trajectory.model.contacts
+        self.mass, self.stiffness = self.structure.mass, self.structure.stiffness
+        self._kept: dict[tuple[int, ...], np.ndarray] = {}
+        self.root = np.sqrt(np.asarray(self.mass.diagonal(), float))[:, None]
+        self.exact = INTERPOLATED if approximated(loads) else EXACT
+        self.complete = trajectory.model.level(()).modes >= self.structure.n
+        self.contacts = [element for element in self.elements if isinstance(element, UnilateralContact)]
+        self.frictions = [element for element in self.elements if isinstance(element, Friction)]
+        self.laws = [element for element in self.elements if isinstance(element, ForceLaw)]
+        self.rough = [c for c in self.contacts if c.tangential is not None and c.most]
+        self.pressing: list[UnilateralContact | ForceLaw] = [*self.contacts, *self.laws]
+        self.rubbing: list[UnilateralContact | Friction] = [*self.rough, *self.frictions]
+        self.springs: list[UnilateralContact | Friction] = [*self.contacts, *self.frictions]
+        self.rows = {element.name: self.structure.row(element.direction) for element in self.elements}
+        self.along = {c.name: self.structure.row(c.tangential) for c in self.rough if c.tangential is not None}
+        self.along |= {friction.name: self.rows[friction.name] for friction in self.frictions}
+
+    @cached_property
+    def damping(self) -> np.ndarray | scipy.sparse.sparray | None:
+        """C (n, n), None for none."""
+        return damping_matrix(self.structure)
+
+    @property
+    def varies(self) -> bool:
+        """Whether loads, stops or counter-surfaces move or change in time."""
+        moves = any(getattr(e, "velocity", 0.0) or getattr(e, "tangential_velocity", 0.0) for e in self.elements)
+        return moves or not all(isinstance(load, (ConstantLoad, Gravity)) for load in self.loads)
+
+    @property
+    def has_equation(self) -> bool:
+        """Whether M, C and K are those of the motion: no measured levels, no damping that is known by modes alone."""
+        modal = isinstance(self.structure.damping, ModalDamping) and scipy.sparse.issparse(self.stiffness)
+        return not modal and not self.trajectory.model.overrides
+
+    @cached_property
+    def bounds(self) -> np.ndarray:
+        """Starts and ends (s + 1,) of the segments [s]."""
+        return np.append(as_segments(self.trajectory.segments).starts, self.trajectory.t_end)
+
+    @cached_property
+    def instants(self) -> np.ndarray:
+        """Times (k,) [s] of some events and of some ends of segments, at most EVENTS of each."""
+        happened = event_table(self.trajectory.events, self.trajectory.model.index)[:, 0]
+        chosen = [np.unique(times) for times in (happened, self.bounds)]
+        return np.unique(
+            np.concatenate([t[np.linspace(0, len(t) - 1, min(EVENTS, len(t))).astype(int)] for t in chosen])
+        )
+
+    @cached_property
+    def x_sides(self) -> tuple[np.ndarray, np.ndarray]:
+        """x (n, k) at the instants from the left and the right."""
+        return self._sides(self.trajectory.displacement, 0)
+
+    @cached_property
+    def v_sides(self) -> tuple[np.ndarray, np.ndarray]:
+        """x' (n, k) at the instants from the left and the right."""
+        return self._sides(self.trajectory.velocity, 1)
+
+    def _sides(self, values: Callable[..., Any], given: int) -> tuple[np.ndarray, np.ndarray]:
+        left, right = (np.asarray(values(self.instants, side)) for side in ("left", "right"))
+        first = self.instants <= self.trajectory.t_start
+        left[:, first] = right[:, first] if self.start is None else np.asarray(self.start[given], float)[:, None]
+        return left, right
+
+    @cached_property
+    def length(self) -> float:
+        """Largest sqrt(M_ii) |x_i| at the instants, and what no motion is [m sqrt(kg)]."""
+        largest = float(np.max(np.abs(self.root * self.x_sides[1]), initial=0.0))
+        return (
+            largest
+            + (NO_MOTION * float(np.max(np.abs(self.root * self.v_sides[1]))) + self.idle) * self.trajectory.t_end
+        )
+
+    @cached_property
+    def speed(self) -> float:
+        """Largest sqrt(M_ii) |x'_i| at the instants, and what no motion is [m/s sqrt(kg)]."""
+        return float(np.max(np.abs(self.root * np.hstack(self.v_sides)), initial=0.0)) + self.idle
+
+    @cached_property
+    def acceleration(self) -> float:
+        """What the forces do at most to free masses [m/s2 sqrt(kg)]."""
+        x = np.abs(self.x_sides[1])
+        forces = sum((np.abs(f) for f in self.forces(self.instants)), abs(self.stiffness) @ x)
+        for friction in self.frictions:
+            forces = forces + friction.most * np.abs(self.rows[friction.name])[:, None]
+        return float(np.max(forces / self.root, initial=0.0))
+
+    @property
+    def idle(self) -> float:
+        """The part of what the forces could do to free masses during the run that is no motion [m/s sqrt(kg)]."""
+        return NO_MOTION * self.acceleration * self.trajectory.t_end
+
+    @property
+    def smallest_bounce(self) -> float:
+        """Velocity [m/s sqrt(kg)] of bounces that are no longer resolved, as their height is round-off."""
+        return float(np.sqrt(BOUNCE * self.length * self.acceleration))
+
+    def forces(self, times: np.ndarray) -> list[np.ndarray]:
+        """Forces (n, k) of every load."""
+        return forces_at(self.structure, self.loads, times, self.trajectory.t_end)
+
+    def stop(self, contact: UnilateralContact, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """z, z' (k,) of its stop."""
+        return stop_motion(self.structure, contact, self.loads, times, self.trajectory.t_end)
+
+    @cached_property
+    def fastest(self) -> float:
+        """A bound of the rates of the motion [rad/s]."""
+        rates = [2 * np.pi * self.trajectory.model.highest_frequency, 1e-300]
+        if self.has_equation and self.damping is not None:
+            rates.append(float(np.max(abs(self.damping).sum(axis=1) / self.root.ravel() ** 2)))
+        rates += [element.damping * self._mobility(element.name) for element in self.elements if element.damping]
+        courses = [getattr(load, "course", None) for load in self.loads]
+        rates += [2 * np.pi * course.frequency_hz for course in courses if isinstance(course, Harmonic)]
+        return max(rates)
+
+    def _mobility(self, name: str) -> float:
+        return float(np.sum((self.rows[name] / self.root.ravel()) ** 2))
+
+    def inside(self, intervals: int, random: np.random.Generator) -> _Inside | None:
+        """Intervals of at most one radian within segments: half of them anywhere, half in segments taken at random."""
+        run, bounds = self.trajectory, self.bounds
+        lengths = np.diff(bounds)
+        wide = np.flatnonzero(lengths > SHORTEST * run.t_end)
+        if not len(wide):
+            return None
+        anywhere = random.uniform(bounds[0], bounds[-1], intervals // 2)
+        owners = np.searchsorted(bounds, anywhere, side="right") - 1
+        chosen = np.concatenate([owners, random.choice(wide, intervals - len(owners))])
+        chosen = chosen[np.isin(chosen, wide)]
+        width = np.minimum(0.9 * lengths[chosen], 1.0 / self.fastest)
+        first = bounds[chosen] + 0.05 * lengths[chosen]
+        first = first + random.uniform(0, 1, len(chosen)) * (0.9 * lengths[chosen] - width)
+        order = np.argsort(first, kind="stable")
+        ends = np.column_stack([first, first + width])[order]
+        nodes, weights = np.polynomial.legendre.leggauss(NODES)
+        half = np.diff(ends, axis=1) / 2
+        times = (ends.mean(axis=1)[:, None] + half * nodes).ravel()
+        contacts = [element.name for element in self.pressing]
+        return _Inside(
+            ends=ends,
+            times=times,
+            weights=(half * weights).ravel(),
+            x=run.displacement(times),
+            v=run.velocity(times),
+            a=np.asarray(run.acceleration(times)),
+            x_ends=run.displacement(ends.ravel()).reshape(self.structure.n, -1, 2),
+            v_ends=run.velocity(ends.ravel()).reshape(self.structure.n, -1, 2),
+            contact={name: np.asarray(run.contact_force(name, times)) for name in contacts},
+            friction={name: np.asarray(run.friction_force(name, times)) for name in self.along},
+        )
+
+    def length_of(self, contact: UnilateralContact, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """What of a contact's gaps (k,) [m] at x (n, k) is round-off."""
+        largest = self.length * float(np.max(np.abs(self.rows[contact.name]) / self.root.ravel()))
+        return self.exact * (np.max(self.contact_terms(contact, x) + np.abs(z)) + FAR * largest)
+
+    def contact_terms(self, element: Element, x: np.ndarray) -> np.ndarray:
+        """Absolute terms (k,) of h.x + gap."""
+        return np.abs(self.rows[element.name]) @ np.abs(x) + abs(element.gap)
+
+    def kept_modes(self, t: float) -> np.ndarray:
+        """Modes (n, r) of the level at an instant."""
+        level = self.trajectory.segments[int(np.searchsorted(self.bounds, t, side="right")) - 1].level.modal
+        if level.indices not in self._kept:
+            self._kept[level.indices] = level.shapes
+        return self._kept[level.indices]
+
+
+def _told(
+    law: str, off: np.ndarray, allowed: np.ndarray | float, times: np.ndarray, what: str = "its terms"
+) -> list[str]:
+    """A sentence where a deviation (k,) is above what is allowed at times (k,); the worst one is told."""
+    allowed = np.broadcast_to(allowed, off.shape)
+    wrong = ~(off <= allowed)
+    if not np.any(wrong):
+        return []
+    share = np.where(wrong, off / np.maximum(allowed, 1e-300), 0.0)
+    worst = int(np.argmax(share))
+    return [
+        f"{law}: off by {off[worst]:.3g} at t = {times[worst]:.9g} s, {share[worst]:.3g} of what round-off of {what} is"
+    ]
+
+
+def _force_terms(run: _Run, inside: _Inside) -> np.ndarray:
+    """Absolute terms (n, k) of the equation of motion over the roots of the masses: also those that springs make."""
+    x, v, a = (inside.worst(values) for values in (inside.x, inside.v, inside.a))
+    terms = abs(run.mass) @ a + abs(run.stiffness) @ x + sum(np.abs(f) for f in run.forces(inside.times))
+    if run.has_equation and run.damping is not None:
+        terms = terms + abs(run.damping) @ v
+    for law in run.laws:
+        reach = run.contact_terms(law, x) + np.max(np.abs(law.knots))
+        terms = terms + np.abs(run.rows[law.name])[:, None] * (np.max(np.abs(law.slopes)) * reach)
+    for element in run.springs:
+        row = np.abs(run.rows[element.name])
+        if np.isfinite(element.stiffness):
+            terms = terms + row[:, None] * (element.stiffness * run.contact_terms(element, x))
+        terms = terms + row[:, None] * (element.damping * (row @ v))
+    for contact in run.rough:
+        if np.isfinite(contact.tangential_stiffness):
+            row = np.abs(run.along[contact.name])
+            terms = terms + row[:, None] * (contact.tangential_stiffness * (row @ x))
+    for rows, told in ((run.rows, inside.contact), (run.along, inside.friction)):
+        for name, force in told.items():
+            terms = terms + np.abs(rows[name])[:, None] * inside.worst(force)
+    return terms / run.root
+
+
+def _along(run: _Run, row: np.ndarray, terms: np.ndarray) -> np.ndarray:
+    """What force (k,) [N] along a row the terms (n, k) over the roots of the masses are."""
+    weighted = np.abs(row) / run.root.ravel()
+    return np.max(terms, axis=0) * np.sum(weighted) / float(weighted @ weighted)
+
+
+def _motion(run: _Run, inside: _Inside) -> list[str]:
+    """M x'' + C x' + K x - f - sum h N + sum h_t T = 0, of a truncated model in the modes that it keeps.
+
+    Where inputs vary these models leave out the damping of the quasi-static motion that their modes do not contain.
+    """
+    if not run.has_equation:
+        return []
+    rest = run.mass @ inside.a + run.stiffness @ inside.x - sum(run.forces(inside.times), 0 * inside.x)
+    if run.damping is not None:
+        rest = rest + run.damping @ inside.v
+    for name, N in inside.contact.items():
+        rest = rest - np.outer(run.rows[name], N)
+    for name, T in inside.friction.items():
+        rest = rest + np.outer(run.along[name], T)
+    terms = np.max(inside.terms, axis=0)
+    if run.complete:
+        return _told("equation of motion", np.max(np.abs(rest / run.root), axis=0), run.exact * terms, inside.times)
+    kept = [run.kept_modes(t) for t in inside.times]
+    off = np.array([np.max(np.abs(modes.T @ rest[:, k]), initial=0.0) for k, modes in enumerate(kept)])
+    allowed = run.exact * terms * run.structure.n
+    if run.damping is not None and run.varies:
+        left_out = abs(run.damping) @ np.abs(inside.v)
+        allowed = allowed + [np.max(np.abs(modes.T) @ left_out[:, k], initial=0.0) for k, modes in enumerate(kept)]
+    return _told("equation of motion in the kept modes", off, allowed, inside.times)
+
+
+def _derivatives(run: _Run, inside: _Inside) -> list[str]:
+    """Velocities and accelerations integrate to changes of displacement and velocity."""
+    middle = inside.ends.mean(axis=1)
+    found = []
+    for name, ends, rate, exact, size in (
+        ("velocity", inside.x_ends, inside.v, EXACT, run.length),
+        ("acceleration", inside.v_ends, inside.a, run.exact, run.speed),
+    ):
+        change = np.abs(np.diff(ends, axis=2)[:, :, 0] - inside.per_interval(rate)) * run.root
+        terms = (np.max(np.abs(ends), axis=2) + inside.per_interval(np.abs(rate))) * run.root
+        allowed = exact * (np.max(terms, axis=0) + FAR * size)
+        found += _told(f"{name} as a derivative", np.max(change, axis=0), allowed, middle)
+    return found
+
+
+def _contacts(run: _Run, inside: _Inside) -> list[str]:
+    """The law of every contact."""
+    found = []
+    forces = inside.contact
+    for contact in run.contacts:
+        name, N, row, times = contact.name, forces[contact.name], run.rows[contact.name], inside.times
+        z, z_rate = run.stop(contact, times)
+        gap, rate = row @ inside.x + contact.gap - z, row @ inside.v - z_rate
+        length = run.length_of(contact, inside.x, z)
+        speed = run.exact * (
+            np.max(np.abs(row) @ np.abs(inside.v) + np.abs(z_rate)) + run.speed * np.max(np.abs(row) / run.root.ravel())
+        )
+        force = run.exact * _along(run, row, inside.terms)
+        told = np.asarray(run.trajectory.gap(name, times))
+        found += _told(f"gap of {name}", np.abs(told - gap), length, times)
+        if contact.rigid or contact.damping:
+            found += _told(f"force of {name} pulls", -N, force, times)
+        if not run.complete:
+            continue
+        if contact.rigid:
+            found += _told(f"penetration of {name}", -gap, length, times)
+            pressed = force < N
+            found += _told(f"force of {name} across its gap", np.where(pressed, np.abs(gap), 0.0), length, times)
+            found += _told(f"force of {name} as it opens or closes", np.where(pressed, np.abs(rate), 0.0), speed, times)
+            continue
+        law = np.where(gap < 0, np.maximum(0.0, -contact.stiffness * gap - contact.damping * rate), 0.0)
+        touching = np.abs(gap) <= length  # a damper's force jumps there
+        off = np.where(touching & (contact.damping > 0), 0.0, np.abs(N - law))
+        found += _told(f"law of {name}", off, force + contact.stiffness * length, times)
+    return found
+
+
+def _frictions(run: _Run, inside: _Inside) -> list[str]:
+    """|T| within its limit, at it and against the slip where the patch slips."""
+    found = []
+    for element in run.rubbing:
+        name, times, row, T = element.name, inside.times, run.along[element.name], inside.friction[element.name]
+        allowed = run.exact * _along(run, row, inside.terms)
+        if isinstance(element, Friction):
+            kinetic, static = np.full(len(T), element.limit), np.full(len(T), element.most)
+            spring, belt = element.stiffness, element.velocity
+        else:
+            kinetic, static = element.friction * inside.contact[name], element.most * inside.contact[name]
+            spring, belt = element.tangential_stiffness, element.tangential_velocity
+            allowed = allowed + element.most * run.exact * _along(run, run.rows[name], inside.terms)
+        found += _told(f"friction of {name} beyond its limit", np.abs(T) - static, allowed, times)
+        if not run.complete:
+            continue
+        slip, round_off = _slip(run, inside, row, T, spring, belt)
+        moves = np.abs(slip) > round_off
+        acts = np.abs(T) > allowed
+        along = moves & acts & (slip * T < 0)
+        found += _told(f"friction of {name} along its slip", np.where(along, np.abs(T), 0.0), allowed, times)
+        at_limit = np.where(moves, np.abs(np.abs(T) - kinetic), 0.0)
+        found += _told(f"friction of {name} that slips off its limit", at_limit, allowed, times)
+    return found
+
+
+def _slip(
+    run: _Run, inside: _Inside, row: np.ndarray, T: np.ndarray, spring: float, belt: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Slip (k,) at the nodes and its round-off: a velocity, with a spring the way over the interval of the node."""
+    size = run.speed * float(np.max(np.abs(row) / run.root.ravel())) + abs(belt)
+    if np.isinf(spring):
+        return row @ inside.v - belt, np.full(len(T), MOVES * size)
+    patch = row @ inside.x - belt * inside.times - T / spring
+    shaped = patch.reshape(-1, NODES)
+    way = np.repeat(shaped[:, -1] - shaped[:, 0], NODES)
+    lasted = np.repeat(inside.ends[:, 1] - inside.ends[:, 0], NODES)
+    terms = np.abs(row) @ np.abs(inside.x) + np.abs(belt * inside.times) + np.abs(T) / spring
+    return way, MOVES * size * lasted + EXACT * np.max(terms)
+
+
+def _laws(run: _Run, inside: _Inside) -> list[str]:
+    """The force of every force law is that of its displacement."""
+    found = []
+    for law in run.laws if run.complete else ():
+        q = run.rows[law.name] @ inside.x
+        F = np.interp(q, law.knots, law.forces)
+        F = F + law.slopes[0] * np.minimum(0.0, q - law.knots[0]) + law.slopes[-1] * np.maximum(0.0, q - law.knots[-1])
+        N = np.asarray(run.trajectory.contact_force(law.name, inside.times))
+        size = np.max(np.abs(law.forces)) + np.max(np.abs(law.slopes)) * np.max(run.contact_terms(law, inside.x))
+        found += _told(f"law of {law.name}", np.abs(N + F), EXACT * size, inside.times)
+    return found
+
+
+def _instants(run: _Run) -> list[str]:
+    """Displacements never jump, velocities by the impulses of rigid contacts, which leave their stops."""
+    if not run.complete:
+        return []
+    jump = np.max(np.abs(run.root * (run.x_sides[1] - run.x_sides[0])), axis=0)
+    found = _told("displacement jumps", jump, EXACT * run.length, run.instants, "the largest displacement")
+    rigid = [contact for contact in run.contacts if contact.rigid]
+    impulses, counts = _impulses(run, rigid)
+    found += _momentum(run, rigid, impulses)
+    for k, contact in enumerate(rigid):
+        found += _rebounds(run, contact, impulses[k], (np.sum(impulses > 0, axis=0) == 1) & (counts == 1))
+    return found
+
+
+def _impulses(run: _Run, rigid: Sequence[UnilateralContact]) -> tuple[np.ndarray, np.ndarray]:
+    """Impulses (c, k) [N s] of rigid contacts at the instants, and how many impacts (k,) each instant has."""
+    times = {t: k for k, t in enumerate(run.instants.tolist())}
+    places = {contact.name: i for i, contact in enumerate(rigid)}
+    impulses, counts = np.zeros((len(rigid), len(times))), np.zeros(len(times), int)
+    for event in run.trajectory.events if rigid else ():
+        if (k := times.get(event.time)) is not None:
+            for name, impulse in ((event.contact, event.impulse), *event.shared):
+                if name in places:
+                    impulses[places[name], k] += impulse
+            counts[k] += event.impulse != 0
+    return impulses, counts
+
+
+def _momentum(run: _Run, rigid: Sequence[UnilateralContact], impulses: np.ndarray) -> list[str]:
+    """M (x'+ - x'-) = sum h p - sum h_t q, p >= 0, |q| <= mu p."""
+    found = []
+    rest = (run.mass @ (run.v_sides[1] - run.v_sides[0])) / run.root
+    terms = np.sum(np.abs(rest), axis=0) + run.speed
+    for contact, p in zip(rigid, impulses, strict=True):
+        row = run.rows[contact.name] / run.root.ravel()
+        rest = rest - np.outer(row, p)
+        terms = terms + np.abs(p) * np.max(np.abs(row))
+        found += _told(
+            f"impulse of {contact.name} pulls", -p * np.max(np.abs(row)), EXACT * terms, run.instants, "momenta"
+        )
+    allowed = run.exact * terms + (run.smallest_bounce if rigid else 0.0)
+    rubbing = [k for k, contact in enumerate(rigid) if contact.further]
+    for j in np.flatnonzero(np.max(np.abs(rest), axis=0) > allowed) if rubbing else ():
+        rows = np.column_stack([run.along[rigid[k].name] / run.root.ravel() for k in rubbing])
+        most = np.array([rigid[k].friction * impulses[k, j] for k in rubbing]) * (1 + EXACT) + EXACT * terms[j]
+        rest[:, j] += rows @ lsq_linear(rows, -rest[:, j], (-most, most), method="bvls", tol=1e-15).x
+    return found + _told("balance of momentum", np.max(np.abs(rest), axis=0), allowed, run.instants, "momenta")
+
+
+def _rebounds(run: _Run, contact: UnilateralContact, impulse: np.ndarray, alone: np.ndarray) -> list[str]:
+    """The contact does not go on into its stop; struck alone and once it leaves it with -e times its velocity."""
+    row, name, times = run.rows[contact.name], contact.name, run.instants
+    scaled = np.abs(row) / run.root.ravel()
+    z, z_rate = run.stop(contact, times)
+    gap = row @ run.x_sides[1] + contact.gap - z
+    arriving, leaving = (row @ v - z_rate for v in run.v_sides)
+    round_off = run.exact * (run.speed * np.sum(scaled) + np.abs(z_rate)) + run.smallest_bounce * np.sum(scaled)
+    touches = np.abs(gap) <= TOUCHES / run.exact * run.length_of(contact, run.x_sides[1], z)
+    into = np.where(touches & (times < run.trajectory.t_end), -leaving, 0.0)  # a run may end as a contact closes
+    found = _told(f"{name} goes on into its stop", into, round_off, times, "velocities")
+    judged = alone & (impulse * (scaled @ scaled) > round_off)
+    if not contact.further:
+        off = np.where(judged, np.abs(leaving + contact.restitution * arriving), 0.0)
+        found += _told(f"rebound of {name}", off, round_off, times, "velocities")
+    return found
+
+
+def _energies(run: _Run, inside: _Inside | None) -> list[str]:
+    """The ledger is closed, what is lost is not negative, and the energies at both ends are those of the motion."""
+    trajectory, ledger = run.trajectory, run.trajectory.ledger
+    end = trajectory.t_end
+    ends = np.array([trajectory.t_start, end])
+    x, v = np.asarray(trajectory.displacement(ends)), np.asarray(trajectory.velocity(ends))
+    if inside is not None:
+        x, v = np.hstack([x, inside.x]), np.hstack([v, inside.v])
+    x, v = np.hstack([x, *run.x_sides]), np.hstack([v, *run.v_sides])
+    scale = _energy_terms(run, x, v)
+    scale = max(
+        scale,
+        *(abs(getattr(ledger, n)) for n in ("initial", "work_of_loads", "impact", "damping", "friction", "final")),
+    )
+    found, at = [], np.array([end])
+    found += _told("ledger is open", np.array([abs(ledger.residual)]), ENERGY * scale, at, "its rows")
+    for name in ("impact", "damping", "friction", "truncation_kinetic"):
+        found += _told(
+            f"ledger row {name} is negative", np.array([-getattr(ledger, name)]), ENERGY * scale, at, "its rows"
+        )
+    if run.complete and not run.trajectory.model.overrides:
+        own = _energy(run, trajectory, end)
+        found += _told("energy at the end", np.array([abs(own - ledger.final)]), ENERGY * scale, at, "energies")
+    return found
+
+
+def _energy_terms(run: _Run, x: np.ndarray, v: np.ndarray) -> float:
+    """Largest sum of the absolute terms of an energy [J]."""
+    terms = 0.5 * np.sum(np.abs(v) * (abs(run.mass) @ np.abs(v)), axis=0)
+    terms = terms + 0.5 * np.sum(np.abs(x) * (abs(run.stiffness) @ np.abs(x)), axis=0)
+    springs: list[tuple[Element, float]] = [(element, element.stiffness) for element in run.springs]
+    for element, stiffness in (*springs, *((law, float(np.max(np.abs(law.slopes)))) for law in run.laws)):
+        if np.isfinite(stiffness):
+            terms = terms + 0.5 * stiffness * run.contact_terms(element, x) ** 2
+    return float(np.max(terms))
+
+
+def _energy(run: _Run, trajectory: Trajectory, t: float) -> float:
+    """Kinetic and strain energy [J] at an instant, from x, x' and forces of friction springs."""
+    x, v = np.asarray(trajectory.displacement(t)), np.asarray(trajectory.velocity(t))
+    energy = 0.5 * float(v @ (run.mass @ v)) + 0.5 * float(x @ (run.stiffness @ x))
+    for law in run.laws:
+        energy += float(law.energy(run.rows[law.name] @ x))
+    for contact in run.contacts:
+        gap = float(run.rows[contact.name] @ x) + contact.gap - float(run.stop(contact, np.array([t]))[0][0])
+        if not contact.rigid and (contact.damping == 0 or float(trajectory.contact_force(contact.name, t)) > 0):
+            energy += 0.5 * contact.stiffness * min(0.0, gap) ** 2
+    springs = [(friction.name, friction.stiffness) for friction in run.frictions]
+    for name, spring in (*springs, *((contact.name, contact.tangential_stiffness) for contact in run.rough)):
+        energy += 0.5 * float(trajectory.friction_force(name, t)) ** 2 / spring
+    return energy
