@@ -182,6 +182,11 @@ class ForceLaw:
         """Numbers of knots with a change of slope, above segment "0" and below it."""
         return len(self._above), len(self._below)
 
+    def is_last(self, state: int) -> bool:
+        """Return whether a state is a last segment, at one of the ends of the span."""
+        up, down = self.knot_counts
+        return state == up or state == up + down or (state == 0 and not down)
+
     @property
     def further(self) -> tuple[Link, ...]:
         """A link for every change of slope: above q_m in ascending order, then below it in descending order."""

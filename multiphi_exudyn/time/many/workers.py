@@ -20,6 +20,7 @@ from multiphi_exudyn.levels.model.mode_choice import Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.time.many.batch import Batch
+from multiphi_exudyn.time.reliability.law_warnings import laws_at_an_end
 from multiphi_exudyn.time.reliability.run_warnings import ModelWarnings
 from multiphi_exudyn.time.reliability.truncation_warnings import indicator_threshold, truncation_warnings
 from multiphi_exudyn.time.run.motion import Motion, carry
@@ -127,7 +128,11 @@ class Task:
         """Warnings of the runs of a batch; a run whose numbers do not suffice is made into a trajectory."""
         model, runs = batch.arrays.levels.model, range(batch.count)
         needs_trajectory = model.general or model.validity is not None or not model.base.complete
-        separate = [k for k in runs if needs_trajectory or not batch.has_defects(k)]
+        separate = [
+            k
+            for k in runs
+            if needs_trajectory or not batch.has_defects(k) or laws_at_an_end(model, batch.visited(k))
+        ]
         motions = [(k, batch.motion(k)) for k in separate]  # first: warnings may rebuild the arrays
         warnings = self._from_numbers(batch, [k for k in runs if k not in separate])
         for k, motion in motions:
