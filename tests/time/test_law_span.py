@@ -7,7 +7,7 @@ import pytest
 
 import multiphi_exudyn as mp
 
-TOLD = re.compile(r"law span: force law '(.*)' leaves its span \((.*), (.*)\) at t = (.*) s and reaches (.*) at t = (.*?) s")
+TOLD = re.compile(r"law span: force law '(.*)' (?:leaves|starts outside) its span \((.*), (.*)\) at t = (.*) s and reaches (.*) at t = (.*?) s")
 
 
 def electrode(damping=0.1):
@@ -65,7 +65,9 @@ class TestLeaving:
         law = mp.ForceLaw("x", ([-1.0, 0.0, 1.0], [-8.0, 0.0, 4.0]))
         run = mp.simulate(mp.MultiPhiModel(structure, [law]), 9.0, displacement=[1.0])
         assert told(run) is None
-        assert told(mp.simulate(mp.MultiPhiModel(structure, [law]), 9.0, displacement=[1.01])) is not None
+        outside = mp.simulate(mp.MultiPhiModel(structure, [law]), 9.0, displacement=[1.01])
+        assert told(outside)[3] == 0.0
+        assert "starts outside its span" in " ".join(outside.warnings)
 
     def test_is_told_of_each_of_many_runs_as_of_it_alone(self):
         model = electrode(0.4)

@@ -52,7 +52,7 @@ def _left_span(trajectory: Trajectory, law: ForceLaw) -> Iterator[str]:
         edge = high if places[first] > high else low
         time = brentq(lambda t: law.centre + float(trajectory.gap(law.name, t)) - edge, times[first - 1], times[first])
     yield (
-        f"law span: force law {law.name!r} leaves its span ({low:g}, {high:g}) at t = {time:.6g} s and reaches "
+        f"law span: force law {law.name!r} {'leaves' if first else 'starts outside'} its span ({low:g}, {high:g}) at t = {time:.6g} s and reaches "
         f"{places[farthest]:.6g} at t = {times[farthest]:.6g} s, where its last segment is continued; give it a span "
         "that holds the motion, or end the run before"
     )
