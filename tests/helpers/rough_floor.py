@@ -94,10 +94,7 @@ class RoughFloor:
                 beyond = max(half for half, part in enumerate(halves) if self.after(s, part @ z) != s)
                 z, left = halves[beyond] @ z, max(left - self.step / 2**beyond, 0.0)
                 changes += 1
-                if s and self.after(s, z) == 0:  # its slip ends: it sticks, or reverses
-                    s = self.after(0, z)
-                elif not s:
-                    s = self.after(0, z)
+                s = self.after(0, z)  # where its slip ends it sticks, or reverses
                 halves = self.kept[s][3]
                 reached = expm(self.kept[s][0] * left) @ z
             else:

@@ -46,10 +46,10 @@ def two_bodies(zeta, gap, units):
 @pytest.mark.parametrize("units", [(1.0, 1.0), (2.0**-9, 2.0**21), (0.7e3, 1.3e-4)])
 @pytest.mark.parametrize("gap", [0.0, 0.1])
 def test_a_free_mass_is_let_go_where_spring_and_damper_cancel(bodies, units, gap):
-    for zeta in (1e-7, 1e-5, 1e-3, 0.01, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 0.95):
+    for zeta in (*10 ** np.linspace(-8, -0.7, 40), 0.3, 0.5, 0.7, 0.9, 0.95):
         structure, stop = bodies(zeta, gap, units)
         model = mp.MultiPhiModel(structure, [stop])
-        for speed in (0.1, 1.0, 3.0, 10.0):
+        for speed in (0.1, 3.0):
             end = (4 / OMEGA + gap / speed) * units[0]
             v = np.array([-speed / units[0], 0.0][: structure.n]) * structure.row(stop.direction)[-1]
             v = v if structure.n == 1 else -v
@@ -132,19 +132,18 @@ def test_the_drawn_ones_strike_and_let_go():
 
 
 @pytest.mark.parametrize("nudge", [0.0, 1e-13, -1e-13])
-@pytest.mark.parametrize(("stiffness", "damping"), [(206.0, 681.0), (3.3e5, 3266.0), (1.5e6, 0.26), (5.8e5, 546.0)])
+@pytest.mark.parametrize(("stiffness", "damping"), [(206.0, 681.0), (3.3e5, 3266.0), (1.5e6, 0.26), (1.06e6, 1096.0)])
 @pytest.mark.parametrize(
     "loads",
     [[mp.HarmonicLoad("tip", 1.0, 3.0)], [mp.ConstantLoad("mid", -1.0), mp.HarmonicLoad("tip", 0.5, 1.0)]],
 )
 def test_a_beam_that_touches_them_begins_alike_wherever_round_off_puts_it(nudge, stiffness, damping, loads):
     random = np.random.default_rng(3)
-    steel = {"youngs_modulus": 2.1e11, "density": 7850.0}
-    strip = mp.Section.rectangle(0.0, 0.3, width=0.02, height=0.005, **steel)
-    beam = mp.planar_beam(mp.Beam([strip], {"tip": 0.3, "mid": 0.15}), 16, mp.ModalDamping(0.01))
+    sheet = mp.Section.rectangle(0.0, 1.0, width=1.0, height=0.01, youngs_modulus=1.2e8, density=100.0)
+    beam = mp.planar_beam(mp.Beam([sheet], {"tip": 1.0, "mid": 0.5}), 20, mp.ModalDamping(0.01))
     stops = [mp.UnilateralContact(at, at, 0.0, stiffness, damping=damping) for at in ("tip", "mid")]
     model = mp.MultiPhiModel(beam, stops, modes="all")
-    run = mp.simulate(model, 0.1, displacement=nudge * random.normal(size=beam.n), loads=loads)
+    run = mp.simulate(model, 0.45, displacement=nudge * random.normal(size=beam.n), loads=loads)
     assert run.status == "ok"
-    forces = [run.contact_force(at, np.linspace(0, 0.1, 400)) for at in ("tip", "mid")]
+    forces = [run.contact_force(at, np.linspace(0, 0.45, 900)) for at in ("tip", "mid")]
     assert np.min(forces) >= -1e-12 * np.max(forces)

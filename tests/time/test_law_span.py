@@ -7,7 +7,10 @@ import pytest
 
 import multiphi_exudyn as mp
 
-TOLD = re.compile(r"law span: force law '(.*)' (?:leaves|starts outside) its span \((.*), (.*)\) at t = (.*) s and reaches (.*) at t = (.*?) s")
+TOLD = re.compile(
+    r"law span: force law '(.*)' (?:leaves|starts outside) its span "
+    r"\((.*), (.*)\) at t = (.*) s and reaches (.*) at t = (.*?) s"
+)
 
 
 def electrode(damping=0.1):

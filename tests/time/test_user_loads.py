@@ -171,9 +171,7 @@ def test_a_force_law_that_pushes_at_rest_moves_as_a_spring_and_a_load(push, load
     one_sided = mp.ForceLaw("x", (np.array([0.0, 1.0]), push + np.array([0.0, 10.0])), name="preload")
     sprung = mp.LinearStructure([[1.0]], [[20.0]], [[0.5]], {"x": 0})
     t, start = np.linspace(0, 5, 41), [-push / 20]
-    expected = mp.simulate(
-        mp.MultiPhiModel(sprung), 5.0, displacement=start, loads=[load, mp.ConstantLoad("x", -push)]
-    )
+    expected = mp.simulate(mp.MultiPhiModel(sprung), 5.0, displacement=start, loads=[load, mp.ConstantLoad("x", -push)])
     for given in (law, one_sided):
         model = mp.MultiPhiModel(mp.LinearStructure([[1.0]], [[10.0]], [[0.5]], {"x": 0}), [given])
         run = mp.simulate(model, 5.0, displacement=start, loads=[load])

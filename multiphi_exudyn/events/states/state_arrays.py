@@ -31,7 +31,15 @@ from multiphi_exudyn.events.arrays import (
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.round_off import ZERO
 
-__all__ = ["accelerate", "acceleration_sizes", "clear_turning_speeds", "copy_state", "keep_scales", "measure", "same_level"]
+__all__ = [
+    "accelerate",
+    "acceleration_sizes",
+    "clear_turning_speeds",
+    "copy_state",
+    "keep_scales",
+    "measure",
+    "same_level",
+]
 
 
 @compiled

@@ -129,9 +129,7 @@ class Task:
         model, runs = batch.arrays.levels.model, range(batch.count)
         needs_trajectory = model.general or model.validity is not None or not model.base.complete
         separate = [
-            k
-            for k in runs
-            if needs_trajectory or not batch.has_defects(k) or laws_at_an_end(model, batch.visited(k))
+            k for k in runs if needs_trajectory or not batch.has_defects(k) or laws_at_an_end(model, batch.visited(k))
         ]
         motions = [(k, batch.motion(k)) for k in separate]  # first: warnings may rebuild the arrays
         warnings = self._from_numbers(batch, [k for k in runs if k not in separate])

@@ -16,7 +16,7 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
-__all__ = ["laws_at_an_end", "law_warnings"]
+__all__ = ["law_warnings", "laws_at_an_end"]
 
 BEYOND = 1e-9  # of the span's width: a law is not left by less
 FEWEST, PER_PERIOD = 9, 8  # samples of a segment of the motion, and of a period of its level's highest frequency
@@ -51,8 +51,9 @@ def _left_span(trajectory: Trajectory, law: ForceLaw) -> Iterator[str]:
     if first > 0 and beyond[first - 1] <= 0:
         edge = high if places[first] > high else low
         time = brentq(lambda t: law.centre + float(trajectory.gap(law.name, t)) - edge, times[first - 1], times[first])
+    how = "leaves" if first else "starts outside"
     yield (
-        f"law span: force law {law.name!r} {'leaves' if first else 'starts outside'} its span ({low:g}, {high:g}) at t = {time:.6g} s and reaches "
+        f"law span: force law {law.name!r} {how} its span ({low:g}, {high:g}) at t = {time:.6g} s and reaches "
         f"{places[farthest]:.6g} at t = {times[farthest]:.6g} s, where its last segment is continued; give it a span "
         "that holds the motion, or end the run before"
     )

@@ -95,8 +95,8 @@ class ModelWarnings:
     """Warnings of a model and of the visited levels, which need no motion.
 
     rigid: whether there is a rigid contact. needs_motion: whether friction, a force law at an end of its span, or the
-    model's own check needs the motion of every run. before, clusters: warnings. fastest: highest frequency of the open level [Hz]. slowest: lowest nonzero
-    frequency of the levels [rad/s]. ample: a duration [s] in which all modes move.
+    model's own check needs the motion of every run. before, clusters: warnings. fastest: highest frequency of the open
+    level [Hz]. slowest: lowest nonzero frequency of the levels [rad/s]. ample: a duration [s] in which all modes move.
     """
 
     rigid: bool
