@@ -84,3 +84,20 @@ def test_any_of_them_move_as_step_by_step(seed):
     turned_over = run.ledger.initial + abs(run.ledger.work_of_loads) + run.ledger.damping + run.ledger.friction
     assert abs(run.ledger.residual) <= 1e-11 * turned_over
     assert run.ledger.friction >= -1e-12 * turned_over
+
+
+@pytest.mark.parametrize("mass", [1.0, 2.0**-20, 300.0])
+def test_a_free_body_beside_it_is_not_damped_by_round_off(mass):
+    """A constant load on it would drift with the load over that damping."""
+    masses = mass * np.array([[3.0, 0.2, 0.0], [0.2, 3.0, 0.0], [0.0, 0.0, 2.0]])
+    damping = mass * np.array([[1.6, -0.5, 0.0], [-0.5, 1.3, 0.0], [0.0, 0.0, 0.0]])
+    structure = mp.LinearStructure(masses, mass * np.diag([17.70657048394034, 1.0, 0.0]), damping,
+                                   {"x": 0, "y": 1, "free": 2})  # fmt: skip
+    floor = mp.UnilateralContact("floor", "y", 0.0, friction=0.1, tangential="x", tangential_velocity=-32.0)
+    pushes = {"y": -320.0, "x": 640.0, "free": 64.0}
+    loads = [mp.ConstantLoad(at, mass * push) for at, push in pushes.items()]
+    run = mp.simulate(mp.MultiPhiModel(structure, [floor]), 2.0, velocity=[-128.0, 0.0, 64.0], loads=loads)
+    t = np.linspace(0, 2, 9)
+    assert_allclose(run.at("free", t), 64 * t + 16 * t**2, rtol=1e-12, atol=1e-11)
+    assert np.max(np.abs(run.at("y", t))) < 1e-11
+    assert abs(run.ledger.residual) < 1e-11 * run.ledger.initial
