@@ -43,7 +43,7 @@ class ForceLaw:
 
     F is approximated by straight segments between knots on it. The segment of q is the law's state: "0" at q_m, the
     zero of F nearest to q = 0, "+1", "+2", ... above it, "-1", "-2", ... below. Beyond the span the last segments are
-    continued. ``contact_force`` of a law is -F, ``gap`` is q - q_m. Two laws are equal only if they are the same
+    continued, and a run that goes there has a warning. ``contact_force`` of a law is -F, ``gap`` is q - q_m. Two laws are equal only if they are the same
     object.
 
     Parameters
