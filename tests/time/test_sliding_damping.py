@@ -81,6 +81,9 @@ def test_any_of_them_move_as_step_by_step(seed):
     t, size = np.linspace(0, end, STEPS + 1), np.max(np.abs(stepped[: structure.n]))
     assert run.status == "ok"
     assert_allclose(run.displacement(t), stepped[: structure.n], rtol=0, atol=1e-9 * size)
+    x, v = run.displacement(t), run.velocity(t)
+    energy = 0.5 * np.sum(v * (structure.mass @ v) + x * (structure.stiffness @ x), axis=0)
+    assert_allclose(run.energy(t), energy, rtol=0, atol=1e-10 * np.max(energy))
     turned_over = run.ledger.initial + abs(run.ledger.work_of_loads) + run.ledger.damping + run.ledger.friction
     assert abs(run.ledger.residual) <= 1e-11 * turned_over
     assert run.ledger.friction >= -1e-12 * turned_over
