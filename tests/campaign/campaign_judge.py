@@ -141,6 +141,11 @@ def _verdicts(scene, motion):
         return [("chatter", motion.message)], motion
     if motion.status != "ok":
         return [("named failure", motion.message)], motion
+    if scene.by_laws:
+        given = zip(motion.runs, motion.given, strict=True)
+        broken = [text for run, (loads, x, v) in given for text in broken_laws(run, loads, (x, v))]
+        verdict = "told: {}" if told(motion) else "failure: {}"
+        return [(verdict.format(text.split(":")[0]), text) for text in broken] or [("ok", motion.message)], motion
     found = [
         (f"failure: {text.split(':')[0]}", text)
         for run, given in zip(motion.runs, motion.given, strict=True)

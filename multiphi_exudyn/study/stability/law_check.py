@@ -52,6 +52,7 @@ __all__ = ["broken_laws"]
 INTERVALS = 20  # short intervals within segments, on each of which the laws are checked at NODES instants
 NODES = 6  # of Gauss quadrature, which integrates over an interval of at most one radian exactly
 EVENTS = 20  # instants of events, and as many ends of segments
+EVEN = 10  # further instants, for the size of the motion
 EXACT = 1e-8  # of the terms of a sum: larger is no round-off
 INTERPOLATED = 1e-4  # the same where a load is interpolated: its tolerance holds for the motion, not for the force
 FAR = 1e-2  # of the largest displacement: its round-off is that of what other masses do not move
@@ -59,6 +60,7 @@ MOVES = 1e-6  # of the largest velocity: slower slip has no direction
 ENERGY = 1e-8  # of the energies turned over
 NO_MOTION = 1e-6  # of what the forces could move a free mass during the run: less is no motion
 TOUCHES = 1e-13  # of a gap's terms: less is none
+BRIEF = 1e-11  # of the run: the same of a shorter bounce
 BOUNCE = 1e-11  # of the largest displacement: a lower bounce may be no more resolved
 SHORTEST = 1e-10  # of the run: a shorter segment is not looked into
 
@@ -179,12 +181,16 @@ class _Run:
 
     @cached_property
     def instants(self) -> np.ndarray:
-        """Times (k,) [s] of some events and of some ends of segments, at most EVENTS of each."""
-        happened = event_table(self.trajectory.events, self.trajectory.model.index)[:, 0]
+        """Times (k,) [s] of some events and of some ends of segments, at most EVENTS of each, and EVEN even ones.
+
+        Without the end of a run that has failed: what happens there is not complete.
+        """
+        run = self.trajectory
+        happened = event_table(run.events, run.model.index)[:, 0]
         chosen = [np.unique(times) for times in (happened, self.bounds)]
-        return np.unique(
-            np.concatenate([t[np.linspace(0, len(t) - 1, min(EVENTS, len(t))).astype(int)] for t in chosen])
-        )
+        chosen = [t[np.linspace(0, len(t) - 1, min(EVENTS, len(t))).astype(int)] for t in chosen]
+        times = np.unique(np.concatenate([np.linspace(run.t_start, run.t_end, EVEN), *chosen]))
+        return times if run.status == "ok" else times[times < run.t_end]
 
     @cached_property
     def x_sides(self) -> tuple[np.ndarray, np.ndarray]:
@@ -219,21 +225,35 @@ class _Run:
     @cached_property
     def acceleration(self) -> float:
         """What the forces do at most to free masses [m/s2 sqrt(kg)]."""
-        x = np.abs(self.x_sides[1])
+        x, v = np.abs(self.x_sides[1]), np.maximum(*np.abs(self.v_sides))
         forces = sum((np.abs(f) for f in self.forces(self.instants)), abs(self.stiffness) @ x)
-        for friction in self.frictions:
-            forces = forces + friction.most * np.abs(self.rows[friction.name])[:, None]
+        if self.has_equation and self.damping is not None:
+            forces = forces + abs(self.damping) @ v
+        pushing = [(friction.name, friction.most) for friction in self.frictions]
+        pushing += [(law.name, float(np.max(np.abs(law.force(self.rows[law.name] @ x))))) for law in self.laws]
+        pushing += [(c.name, c.stiffness * self._deepest(c)) for c in self.contacts if not c.rigid]
+        for name, force in pushing:
+            forces = forces + force * np.abs(self.rows[name])[:, None]
         return float(np.max(forces / self.root, initial=0.0))
+
+    def _deepest(self, contact: UnilateralContact) -> float:
+        """How far [m] an instant is inside a stop, at most."""
+        return float(np.max(-np.asarray(self.trajectory.gap(contact.name, self.instants)), initial=0.0))
 
     @property
     def idle(self) -> float:
         """The part of what the forces could do to free masses during the run that is no motion [m/s sqrt(kg)]."""
         return NO_MOTION * self.acceleration * self.trajectory.t_end
 
-    @property
+    @cached_property
     def smallest_bounce(self) -> float:
-        """Velocity [m/s sqrt(kg)] of bounces that are no longer resolved, as their height is round-off."""
-        return float(np.sqrt(BOUNCE * self.length * self.acceleration))
+        """Velocity [m/s sqrt(kg)] of bounces that are no longer resolved, as their height is round-off.
+
+        Of displacements from equilibria too, to which the forces could move the structure.
+        """
+        slowest = 0.0 if self.laws else 2 * np.pi * float(np.min(self.trajectory.model.level(()).frequencies))
+        reach = self.length + self.acceleration * min(self.trajectory.t_end, 1 / max(slowest, 1e-300)) ** 2
+        return float(np.sqrt(BOUNCE * reach * self.acceleration)) + BRIEF * self.acceleration * self.trajectory.t_end
 
     def forces(self, times: np.ndarray) -> list[np.ndarray]:
         """Forces (n, k) of every load."""
@@ -519,7 +539,8 @@ def _momentum(run: _Run, rigid: Sequence[UnilateralContact], impulses: np.ndarra
         found += _told(
             f"impulse of {contact.name} pulls", -p * np.max(np.abs(row)), EXACT * terms, run.instants, "momenta"
         )
-    allowed = run.exact * terms + (run.smallest_bounce if rigid else 0.0)
+    at_stop = np.any([np.zeros(len(run.instants), bool), *(_touches(run, contact) for contact in rigid)], axis=0)
+    allowed = run.exact * terms + np.where(at_stop, run.smallest_bounce, 0.0)
     rubbing = [k for k, contact in enumerate(rigid) if contact.further]
     for j in np.flatnonzero(np.max(np.abs(rest), axis=0) > allowed) if rubbing else ():
         rows = np.column_stack([run.along[rigid[k].name] / run.root.ravel() for k in rubbing])
@@ -528,16 +549,23 @@ def _momentum(run: _Run, rigid: Sequence[UnilateralContact], impulses: np.ndarra
     return found + _told("balance of momentum", np.max(np.abs(rest), axis=0), allowed, run.instants, "momenta")
 
 
+def _touches(run: _Run, contact: UnilateralContact) -> np.ndarray:
+    """Whether (k,) a contact is at its stop at the instants."""
+    z, _ = run.stop(contact, run.instants)
+    gap = run.rows[contact.name] @ run.x_sides[1] + contact.gap - z
+    return np.asarray(np.abs(gap) <= TOUCHES / run.exact * run.length_of(contact, run.x_sides[1], z))
+
+
 def _rebounds(run: _Run, contact: UnilateralContact, impulse: np.ndarray, alone: np.ndarray) -> list[str]:
     """The contact does not go on into its stop; struck alone and once it leaves it with -e times its velocity."""
     row, name, times = run.rows[contact.name], contact.name, run.instants
     scaled = np.abs(row) / run.root.ravel()
-    z, z_rate = run.stop(contact, times)
-    gap = row @ run.x_sides[1] + contact.gap - z
+    _, z_rate = run.stop(contact, times)
     arriving, leaving = (row @ v - z_rate for v in run.v_sides)
     round_off = run.exact * (run.speed * np.sum(scaled) + np.abs(z_rate)) + run.smallest_bounce * np.sum(scaled)
-    touches = np.abs(gap) <= TOUCHES / run.exact * run.length_of(contact, run.x_sides[1], z)
-    into = np.where(touches & (times < run.trajectory.t_end), -leaving, 0.0)  # a run may end as a contact closes
+    into = np.where(
+        _touches(run, contact) & (times < run.trajectory.t_end), -leaving, 0.0
+    )  # a run may end as a contact closes
     found = _told(f"{name} goes on into its stop", into, round_off, times, "velocities")
     judged = alone & (impulse * (scaled @ scaled) > round_off)
     if not contact.further:
@@ -560,16 +588,27 @@ def _energies(run: _Run, inside: _Inside | None) -> list[str]:
         scale,
         *(abs(getattr(ledger, n)) for n in ("initial", "work_of_loads", "impact", "damping", "friction", "final")),
     )
+    scale = max(scale, run.idle**2)
     found, at = [], np.array([end])
     found += _told("ledger is open", np.array([abs(ledger.residual)]), ENERGY * scale, at, "its rows")
+    returned = {"damping": _stored_inside(run)}
     for name in ("impact", "damping", "friction", "truncation_kinetic"):
-        found += _told(
-            f"ledger row {name} is negative", np.array([-getattr(ledger, name)]), ENERGY * scale, at, "its rows"
-        )
-    if run.complete and not run.trajectory.model.overrides:
+        allowed = ENERGY * scale + returned.get(name, 0.0)
+        found += _told(f"ledger row {name} is negative", np.array([-getattr(ledger, name)]), allowed, at, "its rows")
+    if run.complete and trajectory.status == "ok" and not trajectory.model.overrides:
         own = _energy(run, trajectory, end)
         found += _told("energy at the end", np.array([abs(own - ledger.final)]), ENERGY * scale, at, "energies")
     return found
+
+
+def _stored_inside(run: _Run) -> float:
+    """Energy [J] of viscous contacts that start open inside their stop: damping gives it back if they close there."""
+    first, stored = np.array([run.trajectory.t_start]), 0.0
+    for contact in run.contacts:
+        if contact.damping and float(run.trajectory.contact_force(contact.name, first[0])) <= 0:
+            gap = float(run.trajectory.gap(contact.name, first[0]))
+            stored += 0.5 * contact.stiffness * min(0.0, gap) ** 2
+    return stored
 
 
 def _energy_terms(run: _Run, x: np.ndarray, v: np.ndarray) -> float:

@@ -19,7 +19,8 @@ class Scene:
     """Arguments of one run, the system for brute force, and what is asked of both.
 
     shown, frame: x of the run and of brute force are compared as shown x_run and frame x_brute_force.
-    split: instants at which a run is ended and begun again. units: powers of two of time, length and mass.
+    split: instants at which a run is ended and begun again. units: powers of two of time, length and mass. by_laws:
+    whether the answer need not be unique, and is judged by the law check alone.
     """
 
     kind: str
@@ -35,6 +36,7 @@ class Scene:
     frame: np.ndarray | None = None
     split: Sequence[float] = ()
     units: tuple[int, int, int] = (0, 0, 0)
+    by_laws: bool = False
 
 
 @dataclass
