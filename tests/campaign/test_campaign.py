@@ -42,6 +42,11 @@ LIGHT = dict.fromkeys(KINDS, 3) | {
     "friction units": 9,
     "friction redundant": 8,
     "lattice": 3,
+    "nearly free": 5,
+    "zero gaps": 3,
+    "at events": 3,
+    "dampers": 3,
+    "digits": 3,
 }  # quick ones in which something happens; random_campaign.py runs many
 
 
@@ -445,6 +450,15 @@ class TestJudge:
         impulse = mp.Trajectory.contact_impulse
         monkeypatch.setattr(mp.Trajectory, "contact_impulse", lambda *given: 0.999 * impulse(*given))
         assert self.verdict() == ["failure: impulse"]
+
+    @pytest.mark.parametrize(
+        ("number", "factor", "told"), [(3, -1.0, "failure: pulls"), (3, 1.001, "failure: force"), (3, 1.0, "ok")]
+    )
+    def test_tells_a_force_that_pulls_or_is_not_that_of_the_motion(self, monkeypatch, number, factor, told):
+        force = mp.Trajectory.contact_force
+        monkeypatch.setattr(mp.Trajectory, "contact_force", lambda *given: factor * force(*given))
+        monkeypatch.setattr(campaign_judge, "laws_of", lambda *given: [])
+        assert [kind for kind, _ in judged("viscous", number)[0]] == [told]
 
     def test_tells_a_run_that_fails(self, monkeypatch):
         simulate = mp.simulate

@@ -51,6 +51,7 @@ __all__ = ["broken_laws"]
 
 INTERVALS = 20  # short intervals within segments, on each of which the laws are checked at NODES instants
 NODES = 6  # of Gauss quadrature, which integrates over an interval of at most one radian exactly
+IMPULSES = 3  # of the intervals over which the forces of contacts are integrated
 EVENTS = 20  # instants of events, and as many ends of segments
 EVEN = 10  # further instants, for the size of the motion
 EXACT = 1e-8  # of the terms of a sum: larger is no round-off
@@ -99,7 +100,7 @@ def broken_laws(
     found: list[str] = []
     if inside is not None:
         object.__setattr__(inside, "terms", _force_terms(run, inside))
-        for check in (_motion, _derivatives, _contacts, _frictions, _laws):
+        for check in (_motion, _derivatives, _contacts, _impulses_of_forces, _frictions, _laws):
             found += check(run, inside)
     return [*found, *_instants(run), *_energies(run, inside)]
 
@@ -183,14 +184,14 @@ class _Run:
     def instants(self) -> np.ndarray:
         """Times (k,) [s] of some events and of some ends of segments, at most EVENTS of each, and EVEN even ones.
 
-        Without the end of a run that has failed: what happens there is not complete.
+        Without the end of the run, after which a trajectory tells no motion.
         """
         run = self.trajectory
         happened = event_table(run.events, run.model.index)[:, 0]
         chosen = [np.unique(times) for times in (happened, self.bounds)]
         chosen = [t[np.linspace(0, len(t) - 1, min(EVENTS, len(t))).astype(int)] for t in chosen]
         times = np.unique(np.concatenate([np.linspace(run.t_start, run.t_end, EVEN), *chosen]))
-        return times if run.status == "ok" else times[times < run.t_end]
+        return times[times < run.t_end]
 
     @cached_property
     def x_sides(self) -> tuple[np.ndarray, np.ndarray]:
@@ -413,6 +414,18 @@ def _derivatives(run: _Run, inside: _Inside) -> list[str]:
     return found
 
 
+def _impulses_of_forces(run: _Run, inside: _Inside) -> list[str]:
+    """The impulse of a contact over a few intervals is the integral of its force."""
+    found = []
+    chosen = np.arange(0, len(inside.ends), max(1, len(inside.ends) // IMPULSES))
+    for contact in run.contacts:
+        forces, terms = inside.contact[contact.name], _along(run, run.rows[contact.name], inside.terms)
+        expected, allowed = inside.per_interval(forces)[chosen], run.exact * inside.per_interval(terms)[chosen]
+        impulses = [run.trajectory.contact_impulse(contact.name, *inside.ends[k]) for k in chosen]
+        found += _told(f"impulse of {contact.name}", np.abs(impulses - expected), allowed, inside.ends[chosen, 0])
+    return found
+
+
 def _contacts(run: _Run, inside: _Inside) -> list[str]:
     """The law of every contact."""
     found = []
@@ -563,9 +576,7 @@ def _rebounds(run: _Run, contact: UnilateralContact, impulse: np.ndarray, alone:
     _, z_rate = run.stop(contact, times)
     arriving, leaving = (row @ v - z_rate for v in run.v_sides)
     round_off = run.exact * (run.speed * np.sum(scaled) + np.abs(z_rate)) + run.smallest_bounce * np.sum(scaled)
-    into = np.where(
-        _touches(run, contact) & (times < run.trajectory.t_end), -leaving, 0.0
-    )  # a run may end as a contact closes
+    into = np.where(_touches(run, contact), -leaving, 0.0)
     found = _told(f"{name} goes on into its stop", into, round_off, times, "velocities")
     judged = alone & (impulse * (scaled @ scaled) > round_off)
     if not contact.further:
@@ -595,7 +606,9 @@ def _energies(run: _Run, inside: _Inside | None) -> list[str]:
     for name in ("impact", "damping", "friction", "truncation_kinetic"):
         allowed = ENERGY * scale + returned.get(name, 0.0)
         found += _told(f"ledger row {name} is negative", np.array([-getattr(ledger, name)]), allowed, at, "its rows")
-    if run.complete and trajectory.status == "ok" and not trajectory.model.overrides:
+    happened = event_table(trajectory.events, trajectory.model.index)[:, 0]
+    after = len(happened) and happened[-1] == end  # the last energy is that after the event
+    if run.complete and trajectory.status == "ok" and not after and not trajectory.model.overrides:
         own = _energy(run, trajectory, end)
         found += _told("energy at the end", np.array([abs(own - ledger.final)]), ENERGY * scale, at, "energies")
     return found

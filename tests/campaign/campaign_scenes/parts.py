@@ -11,6 +11,7 @@ import scipy.linalg
 
 import multiphi_exudyn as mp
 
+NEAR = 1e-6  # of the largest value: two motions are the same
 SHORTEST = 60.0  # periods of the fastest level that a scene lasts, at most
 
 
@@ -20,7 +21,8 @@ class Scene:
 
     shown, frame: x of the run and of brute force are compared as shown x_run and frame x_brute_force.
     split: instants at which a run is ended and begun again. units: powers of two of time, length and mass. by_laws:
-    whether the answer need not be unique, and is judged by the law check alone.
+    whether the answer need not be unique, and is judged by the law check alone. near: how far the run and brute force
+    may be apart, of the largest value.
     """
 
     kind: str
@@ -37,6 +39,7 @@ class Scene:
     split: Sequence[float] = ()
     units: tuple[int, int, int] = (0, 0, 0)
     by_laws: bool = False
+    near: float = NEAR
 
 
 @dataclass
