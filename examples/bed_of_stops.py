@@ -117,10 +117,11 @@ def _plot_cost(axes: plt.Axes, costs: list[Cost]) -> None:
     axes.loglog(n, [1e3 * each.first / each.events for each in costs], "o-", label="an event, its level built")
     axes.loglog(n, [1e3 * each.again / each.events for each in costs], "s-", label="an event, levels known")
     axes.loglog(n, [1e3 * each.offline for each in costs], "k:", label="base, once (not per event)")
-    axes.set(xlabel="degrees of freedom", ylabel="CPU time [ms]", title="Cost")
+    axes.set(xlabel="degrees of freedom", ylabel="CPU time [ms]")
+    axes.set_title("Cost", loc="left")
     axes.set_xticks(n, [str(each) for each in n])
     axes.minorticks_off()
-    axes.legend(loc="center right")
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize="small")
 
 
 def main(arguments: list[str], stops: int = STOPS, t_end: float = T_END) -> list[Cost]:

@@ -18,7 +18,7 @@ from reference_models.beam_system import BeamSystem
 
 __all__ = ["Drive"]
 
-ON_GRID = 1e-6  # of a step: nearer to a whole number of steps a time is that of a whole step
+ON_GRID = 1e-3  # of a step: nearer to a whole number of steps, by a sum of many, a time is that of a whole step
 
 
 class Drive:

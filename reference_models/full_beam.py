@@ -55,7 +55,7 @@ __all__ = ["FullBeam", "FullBeamSettings", "FullRun"]
 
 DEFAULT_SETTINGS = FullBeamSettings()
 SYMMETRY = 1e-9  # of the largest entry of a damping matrix
-WHOLE_STEP = 1e-6  # of a step: how far the last sample of a grid may lie beyond the last step
+SUMMED = 1e-9  # of a time: how far the sum of many steps may fall short of it
 
 
 class FullBeam:
@@ -163,7 +163,7 @@ class FullBeam:
             recorder = Recorder(system.mbs, kept, self.settings.output_step, t_end, progress)
             acting = None if actions.none else drive
             integration = integrate(system.mbs, solver, recorder, self.settings.cpu_limit_s, acting)
-            return self._result(system, recorder, integration, matrix, actions, force, offline_s)
+            return self._result(system, recorder, integration, matrix, actions, force, offline_s, t_end)
 
     def _check_round(self, names: set[str], needed: str) -> None:
         if self.settings.contact == "circle" and names:
@@ -213,10 +213,13 @@ class FullBeam:
         actions: Actions,
         force: float,
         offline_s: float,
+        t_end: float,
     ) -> FullRun:
         names = tuple(self.beams.points)
         steps = Histories.recorded(recorder, names, self.contacts, self.settings, actions.ways, self.frictions)
-        grid = steps.at(_grid(steps.time[-1], self.settings))
+        ended = not integration.cause and len(steps.time) == len(recorder.times)
+        last = t_end if ended else float(steps.time[-1])  # Exudyn's running time may fall short of the end it reaches
+        grid = steps.at(_grid(last, self.settings.output_step))
         energy_time, energy = energy_history(system.mbs, recorder, self.laws, steps)
         lost = dissipated_energy(recorder, damping, energy_time) + contact_losses(steps, energy_time)
         tangents = [contact.tangent for contact in self.contacts if contact.tangent]
@@ -289,10 +292,9 @@ def _linearized(beams: Beams, settings: FullBeamSettings) -> LinearizedStructure
     return linear_structure_from(system.mbs, points)[0]
 
 
-def _grid(last: float, settings: FullBeamSettings) -> np.ndarray:
-    """Multiples of output_step [s] up to the last step."""
-    count = math.floor((last + WHOLE_STEP * settings.step) / settings.output_step)
-    return settings.output_step * np.arange(count + 1)
+def _grid(last: float, output_step: float) -> np.ndarray:
+    """Multiples of output_step [s] up to the last time [s]."""
+    return output_step * np.arange(math.floor((1 + SUMMED) * last / output_step) + 1)
 
 
 def _failure(

@@ -43,19 +43,20 @@ def _complete(result: StudyResult) -> bool:
 
 
 def _print_summary(result: StudyResult, folder: Path) -> None:
-    """The cheapest setting of every method for every tolerance, at the first point of the axes, if it was timed."""
+    """The cheapest setting of every method for every tolerance, at its worst point of the axes, if it was timed."""
     places = points(result) if result.rows else [{}]
-    at = places[0]
-    first = f", at the first of {len(places)} points: {words(at)}" if at else ""
+    several = len(places) > 1
+    everywhere = f" at all {len(places)} points" if several else ""
     for tolerance in result.study.tolerances if result.timings else ():
-        print(f"\ncheapest within {share(tolerance)} (NRMSE to {result.window:g} s){first}")
+        print(f"\ncheapest within {share(tolerance)}{everywhere} (NRMSE to {result.window:g} s)")
         print(f"  {'method':32}  {'online':>9}  {'faster':>12}  {'error':>8}  setting")
-        for best in records(cheapest(result, at, tolerance)):
+        for best in records(cheapest(result, None if several else places[0], tolerance)):
             if best["online_s"] is None:
                 print(f"  {best['method']:32}  none")
                 continue
             numbers = f"{seconds(best['online_s']):>9}  {times(best['faster']):>12}  {percent(best['error']):>8}"
-            print(f"  {best['method']:32}  {numbers}  {words(best['setting'])}")
+            worst = f"; worst at {words(best['at'])}" if several else ""
+            print(f"  {best['method']:32}  {numbers}  {words(best['setting'])}{worst}")
     rows = result.rows + result.budgets
     failed = sum(row.status != "ok" for row in rows)
     for sentence in study_warnings(result):

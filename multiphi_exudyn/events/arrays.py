@@ -130,6 +130,7 @@ LIMITS, STATIC_LIMITS = 200, 201  # of rigid friction; mu at compliant contacts 
 TOGETHER = 202  # whether friction at rest has been decided together at this instant
 FRICTIONS, STATIC_FRICTIONS = 212, 213  # mu of rigid contacts, else zero
 PUSHING, ENTERS = 214, 215  # rows of the impulses of a small problem; the state that a closing contact enters
+ROUGHEST_FIRST = 216  # the elements by their friction at rigid contacts (c,): of redundant ones the first carries
 UNMOVED = 224  # flags of elements that cannot move: their exits are not monitored
 WORKING, SUMMED = 225, 226  # whether works are summed as segments end; whether those of the present segment are
 STARTS, START_STATES, START = 228, 229, 230  # offsets of starts and of their states; the number of the run's start

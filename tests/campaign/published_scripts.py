@@ -186,7 +186,7 @@ def _compared(mbs: Any, settings: Any, solve: Any) -> dict[str, str]:
     integration.endTime = began + part * (integration.endTime - began)
     data.SetTime(began, kinds.Current)
     try:
-        shown, trajectory, checked = _reduced(mbs, integration.endTime - began)
+        displacement, trajectory, checked = _reduced(mbs, integration.endTime - began)
     except MultiPhiError as refusal:
         return _verdict("refused", "", mbs, str(refusal))
     except Exception as failure:
@@ -196,11 +196,11 @@ def _compared(mbs: Any, settings: Any, solve: Any) -> dict[str, str]:
     told = "".join(f"{sentence}; " for sentence in trajectory.warnings)
     told += f"of its run {part:.2g}; " if part < 1 else ""
     try:
-        error = _error(settings, solve, start, shown, trajectory)
+        error = _error(settings, solve, start, displacement, trajectory)
         for finer in () if trajectory.warnings else FINER:  # is it the error of Exudyn's own steps?
             if error > AGREEMENT:
                 settings.timeIntegration.numberOfSteps *= FINER[0]
-                error, coarse = _error(settings, solve, start, shown, trajectory), error
+                error, coarse = _error(settings, solve, start, displacement, trajectory), error
                 told += f"{coarse:.2g}, with {finer} times as many steps of Exudyn's own run {error:.2g}; "
     except Exception as failure:  # whatever the script's own run raises
         return _verdict(NO_RUN, "", mbs, f"{type(failure).__name__}: {failure}")
@@ -208,24 +208,24 @@ def _compared(mbs: Any, settings: Any, solve: Any) -> dict[str, str]:
     return _verdict(verdict, f"{error:.2g}", mbs, told, checked)
 
 
-def _error(settings: Any, solve: Any, start: np.ndarray, shown: np.ndarray, trajectory: Any) -> float:
+def _error(settings: Any, solve: Any, start: np.ndarray, displacement: Any, trajectory: Any) -> float:
     """NRMSE of a reduced run beside Exudyn's own."""
     times, own = _own_run(settings, solve, len(start))
     since = np.clip(times - settings.timeIntegration.startTime, 0.0, trajectory.t_end)
-    away = start + (shown @ trajectory.displacement(since)).T - own
+    away = start + displacement(since).T - own
     size = float(np.linalg.norm(own - start))
     return float(np.linalg.norm(away)) / size if size else float(np.any(away))
 
 
-def _reduced(mbs: Any, t_end: float) -> tuple[np.ndarray, Any, str]:
-    """S (n_full, n), the reduced run of ``t_end`` [s], error and lag that its check found."""
+def _reduced(mbs: Any, t_end: float) -> tuple[Any, Any, str]:
+    """The displacement (n_full, k) at times (k,) and run of ``t_end`` [s], error and lag that its check found."""
     import multiphi_exudyn as mp
     from multiphi_exudyn.exudyn_plugin import reduce
 
     found = reduce(mbs)
     run = mp.simulate(found.model, t_end, velocity=found.velocity, loads=found.loads)
     check = found.check(run) if run.status == "ok" else None
-    return found.structure.coordinates, run, f"{check.error:.2g}, {check.lag:.2g} rad" if check else ""
+    return functools.partial(found.displacement, run), run, f"{check.error:.2g}, {check.lag:.2g} rad" if check else ""
 
 
 def _own_run(settings: Any, solve: Any, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -153,6 +153,16 @@ def test_a_study_leaves_runs_table_and_report_and_goes_on_where_it_was(scene, tm
     assert len((folder / "runs.csv").read_text("utf-8").splitlines()) == 1 + 3
 
 
+def test_a_study_over_an_axis_prints_the_worst_of_its_points(scene, tmp_path, capsys):
+    """Of 1 mm the beam hardly reaches its stop."""
+    axis = {"start.displacement": [1e-3, 0.02]}
+    path = write(tmp_path / "axis.toml", STUDY | {"axes": axis, "tolerances": [0.5]})
+    assert cli.main(["study", path, "--on", "serial"]) == 0
+    printed = capsys.readouterr().out
+    assert "cheapest within 50 % at all 2 points" in printed
+    assert "; worst at start.displacement = 0.02" in printed
+
+
 def test_a_study_none_of_whose_settings_ran_has_exit_code_1(scene, tmp_path, capsys):
     study = changed(["methods", 0, "model"], {"kind": "craig-bampton", "modes": 1, "newton_tolerance": 1e-30}, STUDY)
     study = changed(["methods", 0, "axes"], {"step": [1e-4]}, study)

@@ -84,9 +84,11 @@ def test_damped_limit_stops_are_exact_and_differ_from_exudyn_by_the_pull_of_its_
     assert abs(ours - theirs) > 0.2
 
 
-def test_friction_and_a_driven_gear_are_left_out_by_name():
+def test_friction_is_left_out_by_name_and_a_driven_gear_is_taken():
     reduction = reduce(published.friction_stops_and_gears().mbs)
-    assert names_left_out(reduction) == ["regularised", "bristle", "drive"]
+    assert names_left_out(reduction) == ["regularised", "bristle"]
+    (drive,) = (item for item in reduction.taken if item.name == "drive")
+    assert drive.became.endswith("; the motion that it prescribes")
     assert [c.name for c in reduction.model.contacts] == ["stopped.upper", "stopped.lower"]
 
 

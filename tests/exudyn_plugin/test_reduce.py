@@ -420,5 +420,5 @@ def test_a_motion_prescribed_by_velocity_makes_no_difference_to_the_check():
     mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=system.markers, offset=2.0, velocityLevel=True))
     mbs.Assemble()
     reduction = reduce(mbs)
-    assert [item.type for item, _ in reduction.left_out] == ["ObjectConnectorCoordinate"]
+    assert reduction.left_out == ()
     assert reduction.check(run(reduction, 1.0)).error < 1e-6

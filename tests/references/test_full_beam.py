@@ -322,6 +322,48 @@ def test_the_grid_does_not_depend_on_the_step():
     assert found.dofs == FullBeam(RIG, (), found.settings).dofs
 
 
+class TestLastSample:
+    """The last sample belongs to the run, wherever the sum of its steps ends."""
+
+    @pytest.mark.parametrize("short", [1e-13, 1e-10, 1e-7, -1e-10])
+    def test_a_sum_of_steps_that_misses_the_end_by_round_off(self, monkeypatch, short):
+        keep = Recorder.__call__
+        monkeypatch.setattr(Recorder, "__call__", lambda self, mbs, t: keep(self, mbs, t * (1 - short)))
+        _, found = run(0.01, elements=4, step=1e-4)
+        np.testing.assert_array_equal(found.time, 1e-4 * np.arange(101))
+        assert all(len(found.points[name]) == 101 and np.all(np.isfinite(found.points[name])) for name in RIG.points)
+        assert len(found.contact_force["support"]) == 101
+
+    @pytest.mark.parametrize("interval", [1e-4, 3e-4, 7e-5, 0.1 / 1024])
+    @pytest.mark.parametrize("samples", [1, 3, 57])
+    @pytest.mark.parametrize("step", [1e-4, 6.51e-5])
+    def test_any_end_and_step(self, interval, samples, step):
+        expected = interval * np.arange(samples + 1)
+        _, found = run(expected[-1], elements=2, contacts=(), step=step, output_step=interval)
+        np.testing.assert_array_equal(found.time, expected)
+
+    def test_steps_that_the_solver_halves(self):
+        """Near the round-off of the beam's iteration some steps are taken in halves."""
+        _, found = run(0.0715, elements=4, step=1e-4, newton_tolerance=3e-8)
+        assert found.status == "ok"
+        assert found.steps > 715
+        np.testing.assert_array_equal(found.time, 1e-4 * np.arange(716))
+
+    def test_an_end_between_two_samples(self):
+        _, found = run(0.01005, elements=2, contacts=(), step=1e-4)
+        np.testing.assert_array_equal(found.time, 1e-4 * np.arange(101))
+
+    def test_a_failed_run_has_none_after_its_last_step(self):
+        _, found = run(0.1, elements=6, step=1e-4, newton_tolerance=1e-15)
+        assert found.status == "failed"
+        assert found.failed_at - 1e-4 < found.time[-1] <= found.failed_at * (1 + 1e-9)
+
+    @pytest.mark.slow  # half a million steps, of which Exudyn's running time sums up to 4e-11 s less than 10 s
+    def test_half_a_million_steps(self):
+        _, found = run(10.0, elements=2, contacts=(), step=2e-5, newton_tolerance=1e-3, output_step=1e-3)
+        np.testing.assert_array_equal(found.time, 1e-3 * np.arange(10001))
+
+
 def test_a_run_can_be_repeated():
     full, first = run(0.02, elements=6, step=1e-4)
     second = full.run(0.02, damping=modal_damping(full.structure), **START)

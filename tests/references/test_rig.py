@@ -143,6 +143,7 @@ class TestAssumptions:
         "Poisson ratio",
         "hole positions",
         "initial displacement",
+        "gravity",
         "clamp",
         "damping above the fourth mode",
         "damping of the closed level",
@@ -168,6 +169,11 @@ class TestAssumptions:
         assert f"hole3 (nearest the tip) {points['hole3']:.3f} m" in text
         assert f"{1e3 * the_rig.initial_displacement():g} mm at node3" in text
         assert f"ratio {100 * the_rig.rig_damping().beyond:g} %" in text
+        structure = planar_beam(the_rig.rig_beam(), 57)
+        down = np.zeros(structure.n)
+        down[::2] = 9.81
+        sag = structure.row("node2") @ np.linalg.solve(structure.stiffness, structure.mass @ down)
+        assert f"sag by {1e3 * sag:.1f} mm at node2" in text
 
     @pytest.mark.parametrize("function", ["rig_beam", "assumptions", "published_override", "identified_set"])
     def test_an_unknown_set_is_refused(self, refused, function):

@@ -21,6 +21,7 @@ from multiphi_exudyn.study.accuracy.analysis import (
     rank_correlation,
     references_at,
     settings,
+    settings_at_worst,
     uncertainty,
     words,
 )
@@ -93,6 +94,21 @@ def test_settings_at_other_points_of_the_scene_are_others():
     assert points(result) == [{"load": 1.0}, {"load": 2.0}]
     assert uncertainty(result, {"load": 2.0}) == 0.2
     assert uncertainty(result, {"load": 3.0}) is None
+
+
+def test_over_several_points_a_setting_is_as_wrong_as_at_its_worst_one():
+    """Setting 1 is the best of all at load 1, setting 3 has no error at load 2."""
+    errors = {(1, 1.0): 0.01, (1, 2.0): 0.4, (2, 1.0): 0.06, (2, 2.0): 0.02, (3, 1.0): 0.001, (3, 2.0): None}
+    rows = [row("a", e, {"load": x}, {"modes": m}) for (m, x), e in errors.items()]
+    timings = [timing("a", m * x, {"load": x}, {"modes": m}) for m, x in errors]
+    result = result_of(rows, timings, [{"name": "a", "model": {"kind": "reduced"}}])
+    found = lines(settings_at_worst(result))
+    assert [s.setting["modes"] for s in found] == [1, 2, 3]
+    assert [(s.at["load"], s.online_s) for s in found] == [(2.0, 1.5), (1.0, 3.0), (2.0, 4.5)]
+    assert [s.error for s in found][:2] == [0.4, 0.06]
+    assert math.isnan(found[2].error)
+    for tolerance, modes in ((0.5, 1), (0.1, 2), (0.05, None)):
+        assert chosen(cheapest(result, None, tolerance)) == {"a": modes}
 
 
 @pytest.mark.parametrize(

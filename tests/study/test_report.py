@@ -1,6 +1,7 @@
 """The report: complete, self-contained, and honest about what failed or is unknown."""
 
 import base64
+import itertools
 import json
 import re
 import sys
@@ -239,6 +240,24 @@ def test_without_a_coarser_copy_the_uncertainty_is_called_unknown(comparison, pi
         assert figure_style.png(plots.error_time_figure(spoiled)).startswith(b"\x89PNG")
 
 
+def test_a_busy_machine_is_told_with_its_load(comparison):
+    alone, busy = (replace(comparison, environment={"cores": 4, "load_average": load}) for load in (3.9, 11.25))
+    assert "Compare ratios" in findings(alone)["distrust"][-1]
+    assert "the load average rose to 11 on 4 cores" in findings(busy)["distrust"][-1]
+
+
+def test_a_page_says_where_its_points_are(comparison, setup):
+    assert "clamp: middle 300 mm, tip 500 mm." in " ".join(findings(comparison)["compared"])
+
+
+def test_lines_that_coincide_are_all_seen(comparison):
+    """Each is narrower than those drawn before it, or a row of dots."""
+    lines = [style for name, style in plots.styles(comparison).items() if comparison.runs[name].kind != "full"]
+    widths = [style.width for style in lines if style.line == "-"]
+    assert all(a > b for a, b in itertools.pairwise(widths))
+    assert plots.styles(comparison)["full"].width > max(widths)
+
+
 def test_pictures_leave_no_global_state(comparison):
     plots.history_figure(comparison, "tip")
     pyplot = sys.modules.get("matplotlib.pyplot")  # loaded by another library, if at all
@@ -261,8 +280,11 @@ def test_a_scene_of_matrices_is_compared_without_shapes(tmp_path):
     scene = load_scene(write(tmp_path / "matrices.toml", changed(["models", 1, "modes"], 1, data)))
     compared = compare(prepare(scene, mechanics_of(scene)), {}, progress=False)
     assert [run.status for run in compared.runs.values()] == ["ok", "ok"]
+    assert compared.environment["load_average"] >= 0
     assert level_modes(compared) == ()
-    assert "A static force of +1 N at tip" in text_of(render(compared, (), loss_tables(compared.setup)))
+    page = text_of(render(compared, (), loss_tables(compared.setup)))
+    assert "A static force of +1 N at tip" in page
+    assert "Offline: time to compute modes and the static start; the matrices are given." in page
 
 
 def test_modes_along_the_beam_have_the_frequencies_of_the_runs(setup, comparison):

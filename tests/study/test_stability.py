@@ -118,6 +118,27 @@ class TestTheJudgeSees:
         assert "pulls" in complaints(problem, dataclasses.replace(trajectory, segments=SegmentList(pulled)))
 
 
+def test_a_user_object_is_right_or_wrong_or_too_coarse(honest):
+    problem, trajectory = honest
+    right = run_user_object(problem, trajectory, 8000, 20.0)
+    assert (right.status, right.wrong, right.message) == ("ok", (), "")
+    assert right.difference < 1e-6
+    elsewhere = dataclasses.replace(problem, contacts=[stop("m2", 0.3, problem.contacts[0].stiffness)])
+    wrong = run_user_object(elsewhere, trajectory, 8000, 20.0)
+    assert wrong.status == "ok"
+    assert wrong.wrong[0].startswith("differs from native by ")
+    coarse = run_user_object(problem, trajectory, 30, 20.0)
+    assert (coarse.status, coarse.wrong) == ("failed", ())
+    assert "differs from native by " in coarse.message
+    assert "30 steps allowed" in coarse.message
+
+
+@pytest.mark.parametrize("name", ["viscous-closes-again-inside", "viscous-overdamped"])
+def test_what_a_damped_stop_gives_back_as_it_closes_again_is_no_error_of_the_energy(name):
+    case = BY_NAME[name]
+    assert run_native(case, case.build(True), 20.0, BUDGET).outcome.energy < 1e-12
+
+
 class TestTheJudgeKnowsFriction:
     """Each case is right, and wrong as soon as the problem's friction is another than the trajectory's."""
 

@@ -46,13 +46,14 @@ def test_the_softest_is_the_decade_above_the_structure_and_the_scenes_own_stop(t
 
 
 def test_rigid_levels_are_near_stiff_stops_and_far_from_the_scenes_soft_one(tmp_path):
+    """To 0.06 s: after that the bounces grow round-off, by which two runs differ, to per cents of the motion."""
     setup = bench_of(tmp_path, RIGID, data=changed(["contacts", 0, "stiffness"], 1e4))
     stiff, rigid, soft = stiff_stops(setup), run_model(setup, "rigid"), run_model(setup, "all")
-    from_stiff = stiff.error(rigid, ("tip",), 0.1)
-    assert max(from_stiff, stiff.uncertainty(setup.time, ("tip",), 0.1)) < 0.03
-    assert stiff.error(soft, ("tip",), 0.1) > 0.1
+    uncertain = stiff.uncertainty(setup.time, ("tip",), 0.06)
+    assert max(stiff.error(rigid, ("tip",), 0.06), uncertain) < 2e-3
+    assert stiff.error(soft, ("tip",), 0.06) > 0.1
     values = stiff.values(setup, {"rigid": rigid})
-    assert values["errors"]["rigid"]["0.1"]["tip"] == from_stiff
+    assert values["errors"]["rigid"]["0.1"]["tip"] == stiff.error(rigid, ("tip",), 0.1)
 
 
 def test_loads_that_need_the_scenes_own_mesh_act_on_it(tmp_path):

@@ -482,3 +482,23 @@ def test_a_mode_too_slow_for_a_run_is_told_with_what_is_lost(stiffness, told):
         omega = math.sqrt(stiffness)
         expected = 6.0 if omega == 0 else 3.0 * (1 - math.cos(2 * omega)) / stiffness
         assert run.at("m", 2.0) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("error", [1.0, 0.3])
+def test_after_a_tolerance_another_remedy_is_told_than_a_tolerance(error):
+    """Alone and among many; without one it is the remedy."""
+
+    def warned(modes):
+        start = 3e-3 * np.arange(18.0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            alone = mp.simulate(long_chain(modes), 0.5, displacement=start).warnings
+            many = mp.simulate_many(long_chain(modes), 0.5, np.array([start, start])).warnings
+        assert list(many) == [alone, alone]
+        return " ".join(alone)
+
+    tolerant = warned(mp.Tolerance(error))
+    assert "truncated contact" in tolerant
+    assert "modes=Tolerance" not in tolerant
+    assert f"give Tolerance an error below {error:g}" in tolerant
+    assert "or modes=Tolerance(0.01)" in warned(4)

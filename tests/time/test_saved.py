@@ -109,6 +109,8 @@ def test_a_picture_shades_when_contacts_are_closed(run, saved):
         closed = sum(len(trajectory.contact_intervals(name)) for name in trajectory.contacts)
         assert len(above.patches) == len(below.patches) == closed > 0
         assert [line.get_label() for line in above.lines] == ["tip"]
+        assert (above.get_ylabel(), below.get_ylabel()) == ("displacement", "force")  # in the structure's units
+        assert below.get_xlabel() == "time [s]; grey: stop closed, above closed"
         np.testing.assert_array_equal(
             below.lines[0].get_ydata(), trajectory.contact_force("stop", below.lines[0].get_xdata())
         )

@@ -88,8 +88,10 @@ class Channels:
         centre = _centre(force, level.computed)
         loaded = drop_round_off(loaded, np.abs(level.vectors) @ np.abs(centre))  # zero if the level has all modes
         modal = centre - _centre(force, level.squares) - _centre(level.vectors.T @ pushed, level.computed)
-        constant = slice(excitation.prescribed, None)  # motion is centred on the whole static response to these
+        constant = slice(excitation.prescribed, None)  # motion is centred on the whole static response to these,
         force[:, constant], modal[:, constant] = 0.0, 0.0
+        for k in range(excitation.prescribed, excitation.channels):  # and modes without a centre are driven
+            force[:, k] = static_level.driving_force(unloaded[:, k], -stops[:, k])
         shapes = loaded + moved + level.vectors @ modal
         contact_force = forces_loaded + forces_moved + level.force_rows @ modal
         rate, contact_rate = np.zeros_like(force), np.zeros_like(contact_force)

@@ -18,7 +18,7 @@ the functions that implement it:
    contact closes only if its reaction in the level entered is >= 0. A contact counts as at rest at its stop also if its
    free motion brings it back before its gap is more than round-off: this ends a sequence of ever smaller bounces. A
    contact whose gap the closed contacts already fix stays open at its stop, without a force: of redundant contacts an
-   independent set carries all forces.
+   independent set carries all forces, of those that close together the roughest ones.
    -> striking.impact, impact.collide, resting.list_resting, resting.find_pressed, resting.drop_pulled,
    redundancy.keep_independent, striking.close_without_impact
 3. A rigid contact that requests to open always opens: it never pulls. Friction that requests a change always changes,
@@ -52,13 +52,15 @@ the functions that implement it:
 10. A contact with friction and a tangential spring sticks when it closes. Without a spring it slides in the direction
    of its slip velocity, or sticks if that is zero. A stick or slip that cannot last does not prevent closing: exits
    that are always taken follow at the same instant. A spring that truncation has left beyond the limit sticks while its
-   force returns to the limit. When its normal force falls to zero the contact opens, and its friction ends.
+   force returns to the limit. One that reaches its limit at the instant of an impact sticks in it, and slips after it
+   only if its force would then exceed the limit. When its normal force falls to zero the contact opens, and its
+   friction ends.
    A rigid contact that strikes has a tangential impulse of at most mu times its normal impulse, together with all that
    touch, with or without a slip velocity. After the impact a sliding contact exerts its friction force, and one at rest
    sticks up to its static limit. A contact that starts at its stop starts in stick, and of redundant ones an
    independent set sticks.
-   -> changes.set_requested_states, phases.is_denied, impact.add_friction_rows, resting.sliding_level,
-   rebounds.flag_touching
+   -> changes.set_requested_states, phases.is_denied, decision.apply_requests, impact.add_friction_rows,
+   resting.sliding_level, rebounds.flag_touching
 11. A rigid contact with restitution e that strikes leaves its stop with -e times its velocity. So do all contacts that
    touch and are struck with it, in one impact (Moreau); coupled ones must have one e. A contact that others drive back
    to its stop is struck again at the same instant. If any of them has friction, e is that of impulses: an impact

@@ -58,6 +58,7 @@ from multiphi_exudyn.events.arrays import (
     SHARED,
     SIGNAL,
     SPEEDS_CHANGED,
+    SPRINGS,
     STATES,
     STICKS,
     STRIKING,
@@ -252,10 +253,10 @@ def is_return(ints: Ints, element: int, requested: int) -> int:
 
 @compiled
 def apply_requests(ints: Ints, numbers: Numbers, waves: Waves, requests: int) -> int:
-    """Set WORKED to the state, with its phases, after the requests (c,) are decided; return OK, NEED or FAILED.
+    """10. Set WORKED to the state, with its phases, after the requests (c,) are decided; return OK, NEED or FAILED.
 
     HEARD flags all contacts that touch at this instant. FREED flags those of them whose reaction has fallen to zero at
-    it.
+    it. A friction spring that reaches its limit sticks in an impact.
     """
     c, striking, states = ints[ELEMENTS], ints[STRIKING], ints[ints[WORKED + LEVEL] + STATES]
     set_requested_states(ints, numbers, requests)
@@ -267,8 +268,10 @@ def apply_requests(ints: Ints, numbers: Numbers, waves: Waves, requests: int) ->
         ints[striking + i] = 1 if rigid and ints[ints[HEARD] + i] == 1 and ints[states + i] == OPEN else 0
         strikes += 1 if ints[striking + i] == 1 and ints[requests + i] != NO_REQUEST else 0
         requested = ints[states + i] if ints[requests + i] == NO_REQUEST else ints[requests + i]
-        ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else requested
         sticks = ints[ints[STICKS] + i]
+        if numbers[ints[SPRINGS] + i] > 0.0 and ints[states + i] == sticks and requested > sticks:
+            requested = sticks  # its velocity after the impact decides whether it slips
+        ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else requested
         if (
             bears_no_impulse(ints, numbers, i) == 1 and ints[ints[COMPLIANT_KEY] + i] >= sticks
         ):  # slips, in either direction

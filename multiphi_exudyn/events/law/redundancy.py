@@ -17,6 +17,7 @@ from multiphi_exudyn.events.arrays import (
     LEVEL,
     OPEN,
     RIGID,
+    ROUGHEST_FIRST,
     SPRINGS,
     STATES,
     STICKS,
@@ -35,8 +36,8 @@ __all__ = ["are_independent", "drop_redundant_stick", "held_links", "is_redundan
 def keep_independent(ints: Ints, numbers: Numbers, closing: int) -> int:
     """2. Keep in ``closing`` (c,) contacts that are independent beside HELD, penetrating ones first; return how many.
 
-    Of redundant contacts an independent set carries all forces. Between two stops without clearance, an unloaded
-    contact would otherwise keep the loaded one open.
+    Of redundant contacts an independent set carries all forces, of those that close together the roughest ones. Between
+    two stops without clearance, an unloaded contact would otherwise keep the loaded one open.
     """
     c, union, joined, count = ints[ELEMENTS], ints[UNION], ints[JOINED], 0
     for i in range(c):
@@ -49,7 +50,8 @@ def keep_independent(ints: Ints, numbers: Numbers, closing: int) -> int:
         ints[joined + i] = 0
     count = 0
     for penetrating in range(1, -1, -1):
-        for i in range(c):
+        for k in range(c):
+            i = ints[ints[ROUGHEST_FIRST] + k]
             if ints[closing + i] == 1 and is_refused(ints, WORKED, i) == penetrating:
                 before = ints[union + i]
                 ints[union + i] = 1

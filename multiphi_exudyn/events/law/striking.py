@@ -30,6 +30,7 @@ from multiphi_exudyn.events.arrays import (
     OPEN,
     PUSHED,
     RELEASED,
+    ROUGHEST_FIRST,
     SHARED,
     SLIP_BACKWARD,
     SLIP_FORWARD,
@@ -79,7 +80,8 @@ def impact(ints: Ints, numbers: Numbers, waves: Waves) -> int:
     impact. OK, NEED or FAILED.
     """
     c, touching, count = ints[ELEMENTS], ints[TOUCHING], 0
-    for i in range(c):
+    for k in range(c):
+        i = ints[ints[ROUGHEST_FIRST] + k]
         if ints[ints[STRIKING] + i] == 1 or is_closed_rigid(ints, WORKED, i) == 1:
             ints[touching + count] = i
             count += 1

@@ -54,6 +54,7 @@ def describe_elements(buffers: Buffers, model: MultiPhiModel) -> None:
         a.STATIC_LIMITS: put("numbers", limits[1]),
         a.FRICTIONS: put("numbers", rough[0]),
         a.STATIC_FRICTIONS: put("numbers", rough[1]),
+        a.ROUGHEST_FIRST: put("ints", np.lexsort((-rough[0], -rough[1]))),
         a.RESTITUTIONS: put("numbers", [getattr(element, "restitution", 0.0) for element in model.contacts]),
         **_frictions(buffers, model),
     }

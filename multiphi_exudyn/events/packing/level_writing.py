@@ -163,6 +163,8 @@ def write_motion(ints: Ints, numbers: Numbers, given: Numbers, record: int, moti
             numbers[row + n + j] = -given[damping + i * r + j]
         for j in range(q):
             numbers[row + r + j] = given[force + i * q + j]
+            if j >= ints[PRESCRIBED] and given[force + i * q + j] != 0.0:  # a held place drives a mode
+                ints[record + FORCE] = motion - 3 * r  # where write_modes has put the force
             numbers[row + n + r + j] = given[damping + r * r + i * q + j]
         numbers[row + i] -= given[squares + i]
         numbers[row + 2 * n] = given[squares + 2 * r + i]

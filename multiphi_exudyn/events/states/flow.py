@@ -74,9 +74,25 @@ def expand(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
         r = ints[level + MODES]
         force_flow(ints, numbers, waves, state)
         x, v = ints[FLOW_STATE], ints[FLOW_STATE] + r
+    if force >= 0 and ints[CHANNELS] > ints[PRESCRIBED]:
+        drive_free_modes(ints, numbers, state)
     coefficients_of(ints, numbers, waves, response, x, v, force, c)
     for j in range(p if ints[ints[response + FREE] + PURE] == 0 else 0):
         waves[c + j] *= unit_of_flow(ints, numbers, ints[response + FREE], j)
+
+
+@compiled
+def drive_free_modes(ints: Ints, numbers: Numbers, state: int) -> None:
+    """Set the force on zero-frequency modes of a level: that of static loads, and of held channels at their values."""
+    level, x = ints[state + LEVEL], ints[state + PLACE]
+    r, row = ints[level + MODES], ints[level + MOTION]
+    n = r + ints[CHANNELS]
+    for i in range(r):
+        total = numbers[row + 2 * n]
+        for k in range(r + ints[PRESCRIBED], n):
+            total += numbers[row + k] * numbers[x + k]
+        numbers[ints[level + FORCE] + i] = total
+        row += 2 * n + 1
 
 
 @compiled

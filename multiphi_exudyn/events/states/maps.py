@@ -27,6 +27,7 @@ from multiphi_exudyn.events.arrays import (
     NEEDED_KEY,
     OFFSET,
     PLACE,
+    PRESCRIBED,
     RATE_MATRIX,
     RATE_OFFSET,
     REACH,
@@ -37,6 +38,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.events.states.state_arrays import measure
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
+from multiphi_exudyn.mathematics.round_off import ZERO
 
 __all__ = ["find_level", "find_map", "level_hash", "map_hash", "map_state", "move"]
 
@@ -182,6 +184,11 @@ def move(ints: Ints, numbers: Numbers, places: int, speeds: int, level: int, res
         ints, numbers, way, other, ints[places + PLACE], ints[speeds + SPEED], ints[here + MODES] + channels,
         ints[there + MODES] + channels, rows, ints[result + PLACE], ints[result + SPEED], sizes,
     )  # fmt: skip
+    for i in range(
+        ints[level + MODES] + ints[PRESCRIBED], rows
+    ):  # a place taken over where it is zero but for round-off
+        if abs(numbers[ints[result + PLACE] + i]) <= ZERO * numbers[sizes + i]:
+            numbers[ints[result + PLACE] + i] = 0.0
     ints[result + LEVEL] = level
     measure(ints, numbers, result)
     sets_places = ints[other + MAP_TERMS] >= 0

@@ -19,7 +19,7 @@ A load or connector at coordinate k of the node acts on mode k of the present le
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -28,7 +28,13 @@ import numpy as np
 from multiphi_exudyn.events.transitions.state import Event, Loss, State, total_loss
 from multiphi_exudyn.exudyn_plugin.body.ahead.known_motion import KnownMotion
 from multiphi_exudyn.exudyn_plugin.body.ahead.run_ahead import RunAhead
-from multiphi_exudyn.exudyn_plugin.body.solver.run_checks import check_integration, check_matched, check_start
+from multiphi_exudyn.exudyn_plugin.body.solver.run_checks import (
+    check_integration,
+    check_level,
+    check_matched,
+    check_start,
+)
+from multiphi_exudyn.exudyn_plugin.body.solver.static_solution import StaticChange, static_changes
 from multiphi_exudyn.exudyn_plugin.body.solver.switching import bodies_of, is_isolated, running_solver
 from multiphi_exudyn.exudyn_plugin.body.state.coordinates import SAME_STEP, Coordinates
 from multiphi_exudyn.exudyn_plugin.body.state.level_data import LevelData
@@ -124,13 +130,15 @@ class MultiPhiBody:
         self.model = motion.model
         self.items: dict[str, Any] = {}
         self.matched_step = matched_step
-        self._time = math.nan
+        self._time, self._longest_step, self._duration = math.nan, 0.0, 0.0
         self._motion, self._loads, self._base_warnings = motion, tuple(loads), base_warnings
         self._size = self.model.level_at(()).modes
         self.own_loads = OwnLoads(self.model, loads, self._size, 0.0, end)
         self._state = motion.static_state
         max_levels = self.model.most_levels
         self._stepped_levels: BoundedCache[tuple[int, ...], SteppedLevel] = BoundedCache(max_levels)
+        self._static_states: tuple[int, ...] | None = None
+        self._end: tuple[tuple[int, ...], np.ndarray] | None = None
         self._run_ahead: RunAhead | None = None
         self._stepwise_run: StepwiseRun | None = None
         self._record = RunRecord(self._state, motion.start_loss)
@@ -192,9 +200,17 @@ class MultiPhiBody:
         truncated = 0.0 if self._run_ahead is None else self._run_ahead.update_record()
         loss = total_loss(() if self._stepwise_run is None else self._stepwise_run.events)
         interface = self.coordinates.interface
-        rotations = () if interface is None else interface.warnings
+        rotations = () if interface is None else interface.warnings(self.model.base.modes.rigid > 0)
         summary = self._record.summary(total_loss(self._events) + loss, truncated)
-        return (*warnings_of_body(self.model, summary), *self._base_warnings, *rotations)
+        return (*warnings_of_body(self.model, summary), *self._base_warnings, *rotations, *self._step_warnings)
+
+    @property
+    def _step_warnings(self) -> Iterable[str]:
+        """Warnings of steps that are long for modes that are not matched to them, unless every step ends exactly."""
+        ends_exactly = self._run_ahead is not None and self.varies
+        if self.matched_step is not None or ends_exactly or not self._longest_step:
+            return ()
+        return self._record.coarse_step_warning(self._longest_step, self._duration)
 
     def stepped_level(self, states: Sequence[int]) -> SteppedLevel:
         """The solver's level in which the elements are in these states."""
@@ -251,6 +267,7 @@ class MultiPhiBody:
         if self._run_in_progress is None or not t > self.time:
             return False  # called again for the same step
         check_matched(self, t - self.time)
+        self._longest_step = max(self._longest_step, t - self.time)
         self._run_in_progress.change_step_size(t - self.time)
         return True
 
@@ -261,15 +278,59 @@ class MultiPhiBody:
 
     # ------------------------------------------------------------------ start of a run
 
+    @property
+    def elements(self) -> int:
+        """Number of contacts, force laws and friction elements."""
+        return len(self.model.contacts)
+
+    def begin_static(self) -> None:
+        """Begin a static solution in the level of the data node, whatever the last run ended in."""
+        self._static_states = None
+
     def _begin_static(self, mbs: Any) -> None:
-        """Set the level in the data node for a static solution, whatever the last run ended in."""
+        """Set the level of a static solution, and write it into the data node."""
         self.coordinates.attach(mbs)
         for run in (self._run_ahead, self._stepwise_run):
             if run is not None:
                 run.running = False
-        states, _, self.coordinates.held = self.coordinates.read_level_data()
+        coordinates, (states, _, coordinates.held) = self.coordinates, self.coordinates.read_level_data()
+        if self._static_states is not None and self._static_states != states:
+            states = self._static_states
+            no_phases = np.zeros((1, 0))
+            coordinates.write_level_data(coordinates.layout.rows(states, no_phases, coordinates.held[None])[0])
         stepped = self.stepped_level(states)
-        self.coordinates.set_level(mbs, stepped, self.force_vector(stepped))
+        coordinates.set_level(mbs, stepped, self.force_vector(stepped))
+
+    def static_changes(self) -> list[StaticChange]:
+        """Changes of elements whose states do not agree with the present static solution.
+
+        Raises MultiPhiValueError where friction would change its state.
+        """
+        coordinates, stepped, interface = self.coordinates, self.coordinates.stepped, self.coordinates.interface
+        q, held = coordinates.views[0][: stepped.modes, None], coordinates.held[:, None]
+        time = np.array([0.0 if math.isnan(self.time) else self.time])
+        level, xi, _ = self.own_loads.level_coordinates(stepped, q, 0 * q, held, time)
+        reactions = np.zeros(len(level.level.indices))
+        if interface is not None:  # SolveStatic has the other sign of multipliers
+            reactions = -coordinates.direct_reactions(stepped) @ interface.forces
+            interface.record_angles()
+        self._record.include_level(level.level)
+        self.end_run()
+        return static_changes(self.name, level, xi[:, 0], reactions)
+
+    def take_steps(self, duration: float, step: float) -> None:
+        """Take notice of a run of this duration in steps of this length [s], for its warnings."""
+        self._longest_step, self._duration = step, duration
+
+    def end_run(self) -> None:
+        """Keep the level and the coordinates in which a run or a static solution ends."""
+        self._end = self.coordinates.stepped.states, self.coordinates.views[0].copy()
+
+    def change_static_level(self, change: StaticChange) -> None:
+        """Take the state of an element in the next static solution."""
+        states = list(self.coordinates.stepped.states)
+        states[change.element] = change.state
+        self._static_states = tuple(states)
 
     def _begin(self, mbs: Any, t: float) -> None:
         """Begin a run: take state and level from the system."""
@@ -283,11 +344,14 @@ class MultiPhiBody:
             check_start(mbs, self, self.start, sum(event.loss.impact for event in self._start_events))
         self._run_ahead, self._stepwise_run, self._time = None, None, t
         end = float(mbs.sys["simulationSettings"].timeIntegration.endTime)
+        self.take_steps(end - t, step)
         if self.varies:
             self.own_loads = OwnLoads(self.model, self._loads, self._size, t, end)
         as_created = all(
             np.array_equal(view, start) for view, start in zip(coordinates.views[:2], self.start, strict=True)
         )
+        if not as_created and self._end is not None:
+            check_level(self, coordinates.read_level_data()[0], *self._end)
         self._events = [replace(event, time=t) for event in self._start_events] if as_created else []
         self._state = start_state(self, self.own_loads, mbs, t, step, isolated, as_created)
         self._record = RunRecord(self._state, self._motion.start_loss if as_created else Loss())

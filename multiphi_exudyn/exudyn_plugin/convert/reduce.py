@@ -1,20 +1,22 @@
 """Reduction of an Exudyn system: its linearisation at the current state, its contacts, stops and friction, as a model.
 
-    q = q_0 + S z,   M z'' + C z' + K z = p + (contacts, friction),   p = S^T f(q_0, v_0) + C S^T v_0,   z'(0) = S^T v_0
+    q = q_0 + S z + s(t),   M z'' + C z' + K z = p - S^T (K s + C s') + (contacts, friction)
+    p = S^T f(q_0, v_0) + C S^T v_0,   z'(0) = S^T v_0
 
-q_0, v_0 are the current coordinates and velocities, f [N, N m] the forces there without contacts, limit stops,
-friction and loads by user functions, S the directions the constraints leave free. Points are displacements from q_0. p
-is a constant load: a state out of balance starts to move as the system does. K includes the geometric stiffness of
-constraint forces and weights (geometric_stiffness.py). A load by a function of time is a FunctionLoad, with t = 0 at
-the system's current time, and so is the change with time of the force of an ObjectGenericODE2. Items that the model
-does not contain are in ``left_out``, with the reason.
+q_0, v_0 are the current coordinates and velocities, moved onto the constraints by the shortest way in the mass metric
+(start_state.py), f [N, N m] the forces there without contacts, limit stops, friction and loads by user functions, S the
+directions the constraints leave free, s(t) the motion they prescribe by functions of time (prescribed_motion.py).
+Points are displacements from q_0. p is a constant load: a state out of balance starts to move as the system does. K
+includes the geometric stiffness of constraint forces and weights (geometric_stiffness.py). A load by a function of time
+is a FunctionLoad, with t = 0 at the system's current time, and so is the change with time of the force of an
+ObjectGenericODE2. Items that the model does not contain are in ``left_out``, with the reason.
 
 Exudyn's contact dampers pull at separation; those of the model do not (contact.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -23,7 +25,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.convert.contacts.contacts import contact_distance, contacts_of, spheres_of
 from multiphi_exudyn.exudyn_plugin.convert.contacts.frictions import frictions_of
-from multiphi_exudyn.exudyn_plugin.convert.contacts.point_rows import default_points, requested_points
+from multiphi_exudyn.exudyn_plugin.convert.contacts.point_rows import default_points, moved_by, requested_points
 from multiphi_exudyn.exudyn_plugin.convert.items.item_fates import (
     grouped,
     left_out_directions,
@@ -41,6 +43,9 @@ from multiphi_exudyn.exudyn_plugin.convert.linearisation.full_system import (
     items_of,
     without_contacts,
 )
+from multiphi_exudyn.exudyn_plugin.convert.linearisation.linearisation import MovedBy
+from multiphi_exudyn.exudyn_plugin.convert.linearisation.prescribed_motion import PrescribedMotion, RateLoad
+from multiphi_exudyn.exudyn_plugin.convert.linearisation.start_state import moved_onto_constraints
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.timed_loads import (
     TimedLoad,
     function_loads,
@@ -55,7 +60,10 @@ from multiphi_exudyn.levels.model.mode_choice import Tolerance, UpTo
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 from multiphi_exudyn.mechanics.elements.friction import Friction
+from multiphi_exudyn.mechanics.loads.loads import FunctionLoad, VaryingLoad
+from multiphi_exudyn.mechanics.loads.moving_supports import StopMotion
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad
+from multiphi_exudyn.mechanics.loads.time_functions import Smooth
 from multiphi_exudyn.mechanics.structures.arguments import Matrix
 from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
 
@@ -74,15 +82,18 @@ def reduce(
 ) -> Reduction:
     """Reduce an assembled Exudyn system at its current state; the system is left as it was.
 
-        q = q_0 + S z,   M z'' + C z' + K z = p + (contacts, friction)
+        q = q_0 + S z + s(t),   M z'' + C z' + K z = p - S^T (K s + C s') + (contacts, friction)
         p = S^T f(q_0, v_0) + C S^T v_0,   z'(0) = S^T v_0
 
     q_0, v_0 are the current coordinates and velocities, f the forces there, S the directions that constraints leave
-    free. A state out of balance has a constant load p and starts to move as the system does. Contacts are
-    ObjectContactCoordinate, contacts of spheres (ObjectContactSphereSphere, -SphereTriangle, -SphereTorus, in the
-    direction that they have now) and the limit stops of ObjectConnectorCoordinateSpringDamperExt, called
-    ``<object>.upper`` and ``<object>.lower``; friction is that of the latter where it is the law of ``mp.Friction``,
-    with the object's name.
+    free. Where q_0, v_0 violate constraints they are moved onto them, by the shortest way in the mass metric, as by
+    Exudyn's generalized-alpha solver; a run says so if q_0 moves. s(t) is the motion that offsets of constraints
+    prescribe by functions of time (ObjectConnectorCoordinate and ObjectJointGeneric, also on velocities); what it moves
+    is no point of the structure, and in ``Reduction.displacement``. A state out of balance has a constant load p and
+    starts to move as the system does. Contacts are ObjectContactCoordinate, contacts of spheres
+    (ObjectContactSphereSphere, -SphereTriangle, -SphereTorus, in the direction that they have now) and the limit stops
+    of ObjectConnectorCoordinateSpringDamperExt, called ``<object>.upper`` and ``<object>.lower``; friction is that of
+    the latter where it is the law of ``mp.Friction``, with the object's name.
 
     If the system is unstable, or its matrices are not symmetric, because of directions in which nothing moves it
     (neither velocities nor forces, contacts or loads), these directions are left out. Apply loads to the system before
@@ -112,7 +123,8 @@ def reduce(
     MultiPhiTypeError
         For points of another kind.
     MultiPhiValueError
-        For a system without a symmetric linearisation of second order; with strict=True for what would be left out.
+        For a system without a symmetric linearisation of second order, with coordinates without mass, with joints that
+        slide along cables, or whose constraints cannot be met; with strict=True for what would be left out.
 
     Examples
     --------
@@ -150,8 +162,11 @@ def reduce(
     objects, loads = items_of(mbs)
     now = mbs.systemData.GetTime()  # [s]; the solvers below set it to zero
     with initial_is_current(mbs):
+        start = moved_onto_constraints(mbs, objects, now)
+        motions = {i: motion for i, motion in start.motions.items() if isinstance(motion, PrescribedMotion)}
+        prescribed = np.vstack([np.zeros((0, len(start.shift))), *(motion.directions for motion in motions.values())])
         gaps = {i: contact_distance(mbs, i, item) for i, item in enumerate(objects) if has_contact(item)}
-        frictions = frictions_of(mbs, objects)
+        frictions = {i: _fixed(friction, prescribed) for i, friction in frictions_of(mbs, objects).items()}
         full_contacts: list[UnilateralContact | Friction] = [
             c for i in gaps for c in contacts_of(mbs, i, objects[i], gaps[i])
         ]
@@ -161,17 +176,26 @@ def reduce(
             varying, forces = timed_loads(mbs, loads, now), timed_forces(mbs, objects, now)
             timed = {i: load for i, load in varying.items() if isinstance(load, TimedLoad)}
             time_loads = (*timed.values(), *forces.values())
-            linear = linearised(mbs, now, [*full_rows.values(), *(row for load in time_loads for row in load.rows)])
-        rows = default_points(mbs, linear.basis) if points is None else requested_points(mbs, points, linear.basis)
+            rows_that_push = [*full_rows.values(), *(row for load in time_loads for row in load.rows)]
+            linear = linearised(mbs, now, rows_that_push, motions)
+        if points is None:
+            rows = default_points(mbs, linear.basis, prescribed)
+        else:
+            rows = requested_points(mbs, points, linear.basis, prescribed)
     if damping is None and np.any(linear.damping):
         damping = linear.damping
     structure = LinearizedStructure(linear.mass, linear.stiffness, damping, rows, coordinates=linear.basis)
     contacts = [replace(c, direction=_project(full_rows[c.name], linear.basis)) for c in full_contacts]
     moving = [c for c in contacts if np.any(structure.row(c.direction))]
     names = {c.name for c in moving}
-    taken = (*_with_time_change(taken_objects(objects, names), forces), *_taken_loads(loads, timed))
+    taken = (*_with_time_change(taken_objects(objects, names), forces, motions), *_taken_loads(loads, timed))
     left_out = (
-        *left_out_objects(objects, names, {i: reason for i, reason in frictions.items() if isinstance(reason, str)}),
+        *left_out_objects(
+            objects,
+            names,
+            {i: reason for i, reason in frictions.items() if isinstance(reason, str)},
+            {i: motion if isinstance(motion, str) else "" for i, motion in start.motions.items()},
+        ),
         *((load_item(i, loads[i]), reason) for i, reason in varying.items() if isinstance(reason, str)),
         *left_out_functions(mbs),
     )
@@ -180,24 +204,60 @@ def reduce(
     if strict and missing:
         raise MultiPhiValueError(f"mbs: got what a reduction leaves out ({'; '.join(missing)}), need strict=False")
     linear = replace(linear, contacts={name: full_rows[name] for name in names}, loads=timed, forces=forces)
+    linear = replace(linear, shift=float(np.max(np.abs(start.shift))), violated=start.violated)
     linear = replace(linear, spheres=spheres_of(mbs, objects, names))
     validity = LinearRange(mbs, linear, missing, linearised_functions(left_out), grouped(unmoved))
     return Reduction(
         MultiPhiModel(structure, moving, _modes(modes, structure.n - len(moving)), validity=validity),
-        linear.basis.T @ linear.velocity,
+        linear.basis.T @ (linear.velocity - linear.prescribed(0.0, 1)),
         (
             *([ConstantLoad(linear.static, 1.0)] if np.any(linear.static) else []),
             *(each for load in time_loads for each in function_loads(load, linear.basis)),
+            *(each for moved in linear.moved.values() for each in _motion_loads(moved)),
+            *(each for contact in moving for each in _stop_motions(contact, full_rows[contact.name], motions)),
         ),
         taken,
         (*left_out, *unmoved),
         linear.symmetrised,
+        start.shift,
+        linear.prescribed,
     )
 
 
-def _with_time_change(items: Iterator[Item], forces: Mapping[int, TimedLoad]) -> Iterator[Item]:
+def _fixed(friction: Friction | str, prescribed: np.ndarray) -> Friction | str:
+    """A friction, or the reason why a prescribed motion of its coordinate leaves it out."""
+    if isinstance(friction, Friction) and moved_by(np.asarray(friction.direction), prescribed):
+        return "friction on a coordinate that a prescribed motion moves"
+    return friction
+
+
+def _motion_loads(moved: MovedBy) -> Iterator[VaryingLoad]:
+    """Loads -S^T K e^T u and -S^T C e^T u' of a prescribed motion."""
+    for kind, matrix in ((FunctionLoad, moved.stiffness), (RateLoad, moved.damping)):
+        for column, unit in zip(matrix.T, np.eye(matrix.shape[1]), strict=True):
+            if np.any(column):
+                yield kind(-column, _combined(moved.motion, unit))
+
+
+def _stop_motions(
+    contact: UnilateralContact | Friction, row: np.ndarray, motions: Mapping[int, PrescribedMotion]
+) -> Iterator[StopMotion]:
+    """The motion of a contact's stop by each prescribed motion: that of its gap, but opposite."""
+    for motion in motions.values():
+        if moved_by(row, motion.directions):
+            yield StopMotion(contact.name, Smooth(_combined(motion, -motion.directions @ row)))
+
+
+def _combined(motion: PrescribedMotion, weights: np.ndarray) -> Callable[[Any], float]:
+    return lambda t: float(weights @ motion.value(t))
+
+
+def _with_time_change(
+    items: Iterator[Item], forces: Mapping[int, TimedLoad], motions: Mapping[int, PrescribedMotion]
+) -> Iterator[Item]:
     for item in items:
         also = "; how its force changes with time" if item.index in forces else ""
+        also += "; the motion that it prescribes" if item.index in motions else ""
         yield replace(item, became=f"{item.became}{also}")
 
 

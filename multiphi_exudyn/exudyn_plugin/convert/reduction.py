@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,10 @@ class Reduction(Shown):
     symmetrised : tuple of str
         Matrices that were not symmetric, by how much and between which coordinates. The model has their symmetric part;
         ``check`` determines the effect of the skew part.
+    shift : array (n_full,)
+        Distance of q_0 from the system's current coordinates where these violate constraints, else zero.
+    prescribed : callable
+        s(t) (n_full,), the motion that constraints prescribe by functions of time; zero without any.
 
     Examples
     --------
@@ -81,7 +86,9 @@ class Reduction(Shown):
     loads: tuple[Load, ...]
     taken: tuple[Item, ...]
     left_out: tuple[tuple[Item, str], ...]
-    symmetrised: tuple[str, ...] = ()
+    symmetrised: tuple[str, ...]
+    shift: np.ndarray
+    prescribed: Callable[[float], np.ndarray]
 
     def _facts(self) -> Iterator[tuple[str, str]]:
         yield "degrees of freedom", str(self.structure.n)
@@ -96,6 +103,25 @@ class Reduction(Shown):
         structure = self.model.structure
         assert isinstance(structure, LinearizedStructure)
         return structure
+
+    def displacement(self, trajectory: Trajectory, times: Any) -> np.ndarray:
+        """Displacement of all coordinates of the system from its current ones, q - q_now = shift + S z + s(t).
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+            Of ``simulate`` with this model.
+        times : float or array (k,)
+            [s], from the start of the trajectory.
+
+        Returns
+        -------
+        array (n_full,) or (n_full, k)
+            [m, rad], in the order of ``mbs.systemData.GetODE2Coordinates()``.
+        """
+        moved = np.transpose([self.prescribed(t) for t in np.atleast_1d(times)]) + self.shift[:, None]
+        moved = moved if np.ndim(times) else moved[:, 0]
+        return np.asarray(self.structure.coordinates @ trajectory.displacement(times) + moved)
 
     @property
     def report(self) -> str:

@@ -161,6 +161,13 @@ class PointInertia:
         before, after = self._rows_in(source), self._rows_in(target)
         return np.asarray(matrix - after.T @ (self._impedance(target) @ (after @ matrix - before)))
 
+    def joining(self, rows: np.ndarray, difference: np.ndarray) -> np.ndarray:
+        """Change -R^T X e (r,) of the modal velocity by an impact after which body and parts move as one at the points.
+
+        rows: R (m, r) of the points. difference: e (m,) of the body's velocities there to those of the attached parts.
+        """
+        return np.asarray(-rows.T @ (self._attached.impedance(rows) @ difference))
+
     def directions(self, units: np.ndarray) -> np.ndarray:
         """Vectors (c, b) with products u.B u' for directions u (c, b) of contacts; zero for compliant ones."""
         rigid, reduced = _impact_links(self._base), np.zeros_like(units)

@@ -31,7 +31,7 @@ import exudyn as exu
 import numpy as np
 from exudyn.itemInterface import MarkerNodeCoordinates, ObjectConnectorCoordinateVector, SensorObject
 
-from multiphi_exudyn.exudyn_plugin.coupling.interface_nodes import TURN, InterfaceNode
+from multiphi_exudyn.exudyn_plugin.coupling.interface_nodes import TURN, InterfaceNode, long_lines
 from multiphi_exudyn.exudyn_plugin.coupling.modal_force import static_shift
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.levels.base.modal_base import ModalBase
@@ -65,19 +65,21 @@ class Interface:
     """The interface coordinates of one body in one system.
 
     count: m. nodes: NodeIndex by name. sensors: of f, by name. ties: objects of the constraint y = R q + c.
-    largest_angles: of rigid nodes in the run [rad], by name. max_levels: number of levels of which R and c are kept.
+    largest_angles: in the run [rad], of rigid nodes and of lines between two positions, by their names. max_levels:
+    number of levels of which R and c are kept.
     """
 
     def __init__(self, mbs: Any, name: str, nodes: Sequence[InterfaceNode], max_levels: int) -> None:
         self.nodes: dict[str, Any] = {}
         self.sensors: dict[str, Any] = {}
-        self.largest_angles: dict[str, float] = {}
+        self.largest_angles: dict[tuple[str, ...], float] = {}
         self._name = name
         self._interface_nodes = tuple(nodes)
         self._rows = np.concatenate([node.rows for node in nodes])
         self.count = len(self._rows)
         self._base_rows: tuple[ModalBase | None, np.ndarray] = None, np.zeros(0)
         ends = np.cumsum([len(node.rows) for node in nodes])
+        self._lines = long_lines(self._interface_nodes)
         self._slices = [slice(int(end) - len(node.rows), int(end)) for node, end in zip(nodes, ends, strict=True)]
         self.ties: list[Any] = []
         self._maps: BoundedCache[tuple[int, ...], _PointMap] = BoundedCache(max_levels)
@@ -141,13 +143,18 @@ class Interface:
         first = [self._mbs.GetNodeODE2Index(node) for node in self.nodes.values()]
         sizes = [len(node.rows) for node in self._interface_nodes]
         self.indices = np.concatenate([np.arange(k, k + size) for k, size in zip(first, sizes, strict=True)])
-        self._angles = {
-            node.name: self.indices[part][-node.angles :]
-            for node, part in zip(self._interface_nodes, self._slices, strict=True)
-            if node.angles
-        }
-        self.largest_angles = dict.fromkeys(self._angles, 0.0)
         self._views = tuple(state[key] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
+        parts = [self._views[0][k : k + size] for k, size in zip(first, sizes, strict=True)]
+        nodes = self._interface_nodes
+        self._angles = {
+            (node.name,): part[-node.angles :] for node, part in zip(nodes, parts, strict=True) if node.turns
+        }
+        moved = [part[: len(node.position)] for node, part in zip(nodes, parts, strict=True)]
+        self._vectors = {
+            (nodes[i].name, nodes[j].name): (np.subtract(nodes[j].position, nodes[i].position), moved[i], moved[j])
+            for i, j in self._lines
+        }
+        self.largest_angles = dict.fromkeys([*self._angles, *self._vectors], 0.0)
         rows = [self._mbs.systemData.GetObjectLTGAE(tie) for tie in self.ties]
         self.multipliers = np.concatenate(rows).astype(int)
         self._forces = state["AECoords"]
@@ -158,24 +165,37 @@ class Interface:
         return np.asarray(self._forces[self.multipliers])
 
     @property
-    def has_rotations(self) -> bool:
-        """Whether the interface has rigid nodes, which have rotations."""
-        return any(node.angles for node in self._interface_nodes)
+    def shows_rotations(self) -> bool:
+        """Whether the interface has rigid nodes, which have rotations, or two positions, whose line may turn."""
+        return bool(self._lines) or any(node.turns for node in self._interface_nodes)
 
     def record_angles(self) -> None:
-        """Update the largest angles of rigid nodes with the system's current state."""
-        for name, indices in self._angles.items():
-            self.largest_angles[name] = max(self.largest_angles[name], float(np.linalg.norm(self._views[0][indices])))
+        """Update the largest angles of rigid nodes and lines with the system's current state."""
+        largest = self.largest_angles
+        for name, angles in self._angles.items():
+            largest[name] = max(largest[name], float(np.linalg.norm(angles)))
+        for names, (line, start, end) in self._vectors.items():
+            largest[names] = max(largest[names], _angle(line, line + end - start))
 
-    @property
-    def warnings(self) -> Iterator[str]:
-        """Warnings of rigid nodes whose rotation exceeds the linear range, a sentence each."""
-        for name, angle in self.largest_angles.items():
+    def warnings(self, is_free: bool) -> Iterator[str]:
+        """Warnings of an interface that turns beyond the linear range, or may do so unseen, a sentence each.
+
+        is_free: whether the body can move as a whole.
+        """
+        limit = f"the body is linear, do not trust it beyond {math.degrees(TURN):g} degrees: make the motion smaller"
+        for names, angle in self.largest_angles.items():
             if angle > TURN:
-                yield (
-                    f"rigid interface {name!r}: turned by {math.degrees(angle):.3g} degrees; the body is linear, do "
-                    f"not trust it beyond {math.degrees(TURN):g} degrees: make the motion smaller"
-                )
+                turned = f"turned by {math.degrees(angle):.3g} degrees; {limit}"
+                if len(names) == 1:
+                    yield f"rigid interface {names[0]!r}: {turned}"
+                else:
+                    yield f"turning: the line between {names[0]!r} and {names[1]!r} {turned}"
+        positions = [node.name for node in self._interface_nodes if node.position]
+        if positions and is_free and not self.shows_rotations:
+            yield (
+                f"turning: the body is free to move as a whole and {positions[0]!r} is the only position of its "
+                f"interface, so how far it turns is not known; {limit}, and add a second PositionInterface to watch it"
+            )
 
     def set_level(self, stepped: SteppedLevel, held: np.ndarray) -> None:
         """Set R and c of a level in the ties, at stick positions (h,) [m]."""
@@ -198,6 +218,12 @@ class Interface:
             return force
         modal, points = force[: source.size], force[source.size :]
         return np.concatenate([modal + points @ (self.map_in(target).rows - self.map_in(source).rows), points])
+
+
+def _angle(first: np.ndarray, second: np.ndarray) -> float:
+    """Angle between two vectors [rad]."""
+    along = first.dot(second)
+    return math.atan2(math.sqrt(max(0.0, first.dot(first) * second.dot(second) - along * along)), along)
 
 
 def _direct_reactions(level: Level, in_base: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -23,12 +23,13 @@ import numpy as np
 from exudyn.itemInterface import NodeGenericODE2, NodePoint, NodePoint2D, NodeRigidBody2D, NodeRigidBodyRxyz
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.structures.arguments import real_array
 from multiphi_exudyn.mechanics.structures.structure import At, LinearStructure
 
-__all__ = ["InterfaceNode", "InterfacePoint", "PositionInterface", "RigidInterface", "interface_nodes"]
+__all__ = ["InterfaceNode", "InterfacePoint", "PositionInterface", "RigidInterface", "interface_nodes", "long_lines"]
 
-TURN = math.radians(5.0)  # rad: limit of the rotation of a rigid interface, as the body is linear
+TURN = math.radians(5.0)  # rad: limit of the rotation of an interface, as the body is linear
 ROTATIONS = {2: 1, 3: 3}  # by the number of directions: about z in a plane, about x, y and z in space
 
 
@@ -38,6 +39,9 @@ class PositionInterface:
 
     A body takes it by name, ``items = CreateMultiPhiBody(mbs, model, interface={"tip": PositionInterface(...)})``; the
     node is then ``items["nInterface"]["tip"]``, for MarkerNodePosition.
+
+    A body is linear: a run in which the line between two positions turns by more than 5 degrees issues a warning, and
+    so does every run of a body that is free to move as a whole and has only one position, which does not show it.
 
     Parameters
     ----------
@@ -73,7 +77,8 @@ class RigidInterface:
     A body takes it by name, ``items = CreateMultiPhiBody(mbs, model, interface={"tip": RigidInterface(...)})``; the
     node is then ``items["nInterface"]["tip"]``, for MarkerNodeRigid.
 
-    A body is linear: a run in which a rigid interface rotates by more than 5 degrees issues a warning.
+    A body is linear: a run in which a rigid interface rotates by more than 5 degrees, or the line between two of them,
+    issues a warning.
 
     Parameters
     ----------
@@ -120,6 +125,11 @@ class InterfaceNode:
     position: tuple[float, ...] = ()
     angles: int = 0
 
+    @property
+    def turns(self) -> bool:
+        """Whether it has rotations that move with the body."""
+        return self.angles > 0 and bool(np.any(self.rows[-self.angles :]))
+
     def item(self, name: str, start: np.ndarray, start_t: np.ndarray, visualization: Mapping[str, Any]) -> Any:
         """Exudyn's node with initial coordinates and velocities (k,); visualization: show and color."""
         reference = [*self.position, *[0.0] * self.angles]
@@ -151,6 +161,25 @@ def interface_nodes(
         if not isinstance(name, str):
             raise MultiPhiTypeError(f"interface: got {name!r}, need a name")
     return tuple(_node(structure, name, point) for name, point in points.items())
+
+
+def long_lines(nodes: Sequence[InterfaceNode]) -> list[tuple[int, int]]:
+    """Pairs of nodes, each with a position and the one farthest from it; their lines show how a body turns."""
+    pairs = set[tuple[int, int]]()
+    for i, node in enumerate(nodes):
+        distances = [_distance(node.position, other.position) for other in nodes]
+        j = int(np.argmax(distances))
+        if distances[j] > 0:
+            pairs.add((min(i, j), max(i, j)))
+    return sorted(pairs)
+
+
+def _distance(first: tuple[float, ...], second: tuple[float, ...]) -> float:
+    """Distance of two places of one dimension [m], zero if it is round-off of their coordinates or one has no place."""
+    if len(first) != len(second):
+        return 0.0
+    a, b = np.array(first), np.array(second)
+    return float(np.linalg.norm(drop_round_off(b - a, np.max(np.abs([a, b]), initial=0.0))))
 
 
 def _node(structure: LinearStructure, name: str, point: InterfacePoint) -> InterfaceNode:

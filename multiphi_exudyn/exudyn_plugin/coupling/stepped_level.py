@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 
 __all__ = ["SteppedLevel"]
@@ -55,8 +55,18 @@ class SteppedLevel:
 
     @classmethod
     def of(cls, loaded: LoadedLevel, size: int, step: float | None) -> SteppedLevel:
-        """The equations of a level with modes matched to ``step`` [s], or plain for None."""
-        level = loaded.modal
+        """The equations of a level with modes matched to ``step`` [s], or plain for None.
+
+        Raises NumericalFailure where a stick position drives a mode of zero frequency: a solver's force would change
+        with it.
+        """
+        level, held = loaded.modal, loaded.channels.force[:, loaded.excitation.prescribed :]
+        if np.any(held):
+            raise NumericalFailure(
+                f"level {', '.join(level.closed)}: a friction spring drives a motion that nothing holds, by the "
+                "friction of a sliding contact or beside a negative stiffness; inside Exudyn that is not possible: "
+                "give the motion a small stiffness, or use simulate"
+            )
         squares, damping = np.full(size, np.max(level.squares, initial=0.0)), np.zeros((size, size))
         squares[: level.modes] = level.squares
         stiffness = np.diag(squares)

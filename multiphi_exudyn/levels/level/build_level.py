@@ -19,6 +19,10 @@ __all__ = ["build_level"]
 
 UNDAMPED = 1e-12  # of the largest damping: round-off of projecting it
 NEUTRAL = 1e-12  # of mu: an |omega^2| below it is round-off of zero
+CANCELLED = (
+    1e-7  # of the sum of the |stiffnesses| along a mode: a smaller rest changes the motion less than round-off of
+)
+#                   its static response does, which is the larger the smaller the rest
 
 
 def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = None) -> Level:
@@ -35,6 +39,7 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
     orthogonal = closed_directions.orthogonal
     rigid_body = _rigid_body_modes(base, orthogonal)
     squares, vectors, accuracy, kept = _lowest_modes(base, orthogonal, modes, len(rigid), rigid_body)
+    squares[_cancelled(base, closed, squares, vectors)] = 0.0
     neutral = None
     if not (is_vibrating := np.count_nonzero(squares) == len(squares)):
         squares, vectors = _aligned_free_modes(base, squares, vectors, closed)
@@ -87,6 +92,19 @@ def _lowest_modes(
         if kept is not None:
             return squares, vectors, accuracy, kept
         beyond *= 2
+
+
+def _cancelled(base: ModalBase, closed: Sequence[int], squares: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Return which modes (r,) are neutral, as negative springs cancel the stiffness along them but for a small rest.
+
+    omega^2 is the sum of the stiffnesses along a mode. Where contacts slide, or rigid ones are closed, a mode is
+    neutral only if omega^2 is round-off.
+    """
+    stiffnesses = base.stiffnesses[closed]
+    if np.all(stiffnesses >= 0) or np.any(np.isinf(stiffnesses)) or any(i in base.oblique for i in closed):
+        return np.zeros(len(squares), bool)
+    sizes = base.squares @ vectors**2 + np.abs(stiffnesses) @ (base.directions[:, closed].T @ vectors) ** 2
+    return np.asarray(np.abs(squares) <= CANCELLED * sizes)
 
 
 def _aligned_free_modes(

@@ -34,7 +34,7 @@ from multiphi_exudyn.levels.level.static_response import (
 from multiphi_exudyn.mathematics.eigenproblems.modes import cluster_end
 from multiphi_exudyn.mathematics.response.coupled_response import modal_response
 from multiphi_exudyn.mathematics.response.free_response import ModalResponse, is_slow
-from multiphi_exudyn.mathematics.round_off import ZERO
+from multiphi_exudyn.mathematics.round_off import BALANCED, ZERO, drop_round_off
 from multiphi_exudyn.mechanics.structures.arguments import real_array
 
 if TYPE_CHECKING:
@@ -262,7 +262,7 @@ class Level(Shown):
         rows : array (k, n), default None
             Rows that give the quantities to draw, such as deflections along a beam; None for all degrees of freedom.
         positions : array (k,), default None
-            Position [m] of each quantity; None for its number.
+            Position of each quantity, in any unit; None for its number.
 
         Raises
         ------
@@ -276,7 +276,7 @@ class Level(Shown):
         places = np.arange(len(shown)) if positions is None else real_array("positions", positions, "a (k,) array")
         if places.shape != (len(shown),):
             raise MultiPhiValueError(f"positions: got shape {places.shape}, need ({len(shown)},)")
-        label = ("degree of freedom" if rows is None else "row") if positions is None else "position [m]"
+        label = ("degree of freedom" if rows is None else "row") if positions is None else "position"
         return mode_figure(shown @ self.shapes[:, :count], self.frequencies[:count], places, label)
 
     def asymptotic(self, load: np.ndarray) -> Asymptotic:
@@ -301,6 +301,16 @@ class Level(Shown):
         closed_directions = base.closed_directions(index, gaps)
         along, configuration, _ = self._response(closed_directions, load)
         return base.contact_forces(index, closed_directions, along, base.gaps_at(configuration, initial)), configuration
+
+    def driving_force(self, load: np.ndarray, gaps: np.ndarray) -> np.ndarray:
+        """Return the force (r,) that ``static_response`` leaves on zero-frequency modes, zero on the others."""
+        if self.vibrates:
+            return np.zeros(self.modes)
+        closed_directions = self.base.closed_directions(list(self.indices), gaps)
+        along, _, unbalanced = self._response(closed_directions, load)
+        sizes = np.abs(self.vectors).T @ (np.abs(load) + np.abs(closed_directions.vectors) @ np.abs(along))
+        driving = drop_round_off(self.vectors.T @ unbalanced, BALANCED / ZERO * sizes)
+        return np.where(self.squares, 0.0, driving)
 
     def _response(
         self, closed_directions: ClosedDirections, total: np.ndarray

@@ -80,6 +80,11 @@ class SlidingLevel(Level):
         forces = self._sliding_forces(self.plain.static_response(load, gaps)[0])
         return self.plain.static_response(load + self.added @ forces, gaps)
 
+    def driving_force(self, load: np.ndarray, gaps: np.ndarray) -> np.ndarray:
+        """See ``Level``."""
+        forces = self._sliding_forces(self.plain.static_response(load, gaps)[0])
+        return self.plain.driving_force(load + self.added @ forces, gaps)
+
     def truncated(self, count: int) -> Level:
         """See ``Level``."""
         return with_sliding(self.plain.truncated(count))

@@ -159,12 +159,12 @@ class MultiPhiModel(SharedBase, Shown):
     @property
     def levels_built(self) -> int:
         """Number of levels built so far, including those built again."""
-        return self._levels.kept
+        return self._levels.kept if "_levels" in vars(self) else 0  # no display of a model builds its base
 
     @property
     def levels_kept(self) -> int:
         """Number of cached levels."""
-        return len(self._levels)
+        return len(self._levels) if "_levels" in vars(self) else 0
 
     @property
     def highest_frequency(self) -> float:

@@ -34,6 +34,7 @@ __all__ = [
     "references_at",
     "settings",
     "settings_at",
+    "settings_at_worst",
     "stiff_errors",
     "uncertainty",
     "words",
@@ -52,6 +53,19 @@ def settings(result: StudyResult) -> pd.DataFrame:
 def settings_at(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
     """The methods' settings at one point of the scene's axes."""
     return _at(settings(result), at)
+
+
+def settings_at_worst(result: StudyResult) -> pd.DataFrame:
+    """Every setting of the methods at the point of the scene's axes where its error is largest.
+
+    online_s: the median over the points. A setting without an error at one of the points has none.
+    """
+    table = settings(result).astype({"error": float, "online_s": float}).reset_index(drop=True)
+    of_setting = table.groupby([table.method, table.setting.map(key_of)], sort=False)
+    everywhere = of_setting.error.transform("count") == len(points(result))
+    ranked = table.error.fillna(math.inf).groupby(of_setting.ngroup(), sort=False)
+    online_s = of_setting.online_s.transform("median")
+    return table.assign(error=table.error.where(everywhere), online_s=online_s).loc[ranked.idxmax()]
 
 
 def references_at(result: StudyResult, at: Mapping[str, Any]) -> pd.DataFrame:
@@ -75,13 +89,16 @@ def front(table: pd.DataFrame) -> pd.DataFrame:
     return complete[complete.error < complete.error.cummin().shift(fill_value=math.inf)]
 
 
-def cheapest(result: StudyResult, at: Mapping[str, Any], tolerance: float, lasting: bool = False) -> pd.DataFrame:
-    """Fastest setting of each method whose error is within the tolerance at one point, the fastest method first.
+def cheapest(
+    result: StudyResult, at: Mapping[str, Any] | None, tolerance: float, lasting: bool = False
+) -> pd.DataFrame:
+    """Fastest setting of each method whose error is within the tolerance, the fastest method first.
 
-    A row for each method, empty if none of its settings is. faster: online time of the fastest full model within the
-    tolerance over that of the setting. lasting: whether the lasting error has to be within the tolerance.
+    at: a point of the scene's axes; None for the worst point of every setting. A row for each method, empty if none of
+    its settings is. faster: online time of the fastest full model within the tolerance over that of the setting.
+    lasting: whether the lasting error has to be within the tolerance.
     """
-    drawn = settings_at(result, at)
+    drawn = settings_at_worst(result) if at is None else settings_at(result, at)
     within = drawn[(drawn.lasting_error if lasting else drawn.error) <= tolerance].dropna(subset="online_s")
     best = within.sort_values(["online_s", "error"], kind="stable").groupby("method", sort=False).head(1)
     others = pd.DataFrame({"method": [name for name in drawn.method.unique() if name not in set(best.method)]})

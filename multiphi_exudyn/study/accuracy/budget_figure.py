@@ -34,6 +34,7 @@ FLOOR = 1e-13  # of ||y_ref||: round-off; smaller bars lie below the picture
 HIGHEST = 50.0  # of ||y_ref||: room for shares and causes above the largest differences
 LINE_LENGTH = 110  # characters of a missing rung's cause
 COLOUR_OF = dict(zip(CAUSES, COLOURS, strict=False))
+ON_WHITE = {"facecolor": "white", "edgecolor": "none", "pad": 0.4}  # of a share that the line of the total crosses
 TOTAL: dict[str, Any] = {"color": REFERENCE, "ls": "--", "lw": 1.4}
 
 
@@ -91,7 +92,8 @@ def _bars(axes: Axes, places: np.ndarray, parts: pd.DataFrame, total: float) -> 
     colours = [to_rgba(COLOUR_OF.get(cause, FULL), PALE if known is False else 1.0) for cause, known in pairs]
     bars = axes.bar(places, heights, 0.8, yerr=whiskers, color=colours, error_kw={"lw": 0.9, "capsize": 2})
     shares = [round(share) for share in 100 * parts.share.astype(float).fillna(0.0)]
-    axes.bar_label(bars, [f"{share:+d}" if share else "0" for share in shares], padding=2, fontsize=6.5)
+    texts = [f"{share:+d}" if share else "0" for share in shares]
+    axes.bar_label(bars, texts, padding=2, fontsize=6.5, bbox=ON_WHITE)
     axes.plot(places[[0, -1]] + [-0.5, 0.5], [100 * total] * 2, **TOTAL)
 
 

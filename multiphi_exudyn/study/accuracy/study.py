@@ -12,7 +12,6 @@ stopped goes on where it was; maps are made anew with every report.
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -27,7 +26,7 @@ from multiphi_exudyn.study.accuracy.study_result import MapPair, StudyResult, se
 from multiphi_exudyn.study.measures.measures import measures
 from multiphi_exudyn.study.measures.spectra import FEWEST, FREQUENCIES, wavelet_map
 from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models, stiff_stops
-from multiphi_exudyn.study.running.environment import environment
+from multiphi_exudyn.study.running.environment import environment, load_average
 from multiphi_exudyn.study.running.runners import ready_model, run_model
 from multiphi_exudyn.study.running.runs import ModelRun, from_arrays, to_arrays
 from multiphi_exudyn.study.running.timing import TURNS_BUDGET_S, in_turns
@@ -88,7 +87,7 @@ class TimedRun:
             "online_s": run.online_s,
             "offline_s": run.offline_s,
             "sampling_s": run.sampling_s,
-            "load_average": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+            "load_average": load_average(),
         }
         return Outcome(values, {}, run.status, run.message)
 

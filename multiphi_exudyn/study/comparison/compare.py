@@ -16,6 +16,7 @@ import numpy as np
 
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models, stiff_stops
+from multiphi_exudyn.study.running.environment import load_average
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.model_kinds import ReducedModel, UserObjectModel
@@ -151,13 +152,15 @@ def compare(
 ) -> Comparison:
     """Run every model of the scene; ``started`` is called with each name before it runs.
 
-    A full beam that fails is tried again at gentler settings, and its row says so.
+    Its environment also has the largest load average meanwhile, zero where the system knows none. A full beam that
+    fails is tried again at gentler settings, and its row says so.
     """
-    runs = {}
+    runs, loads = {}, []
     for name in setup.scene.models:
         started(name)
         runs[name] = run_model(setup, name, progress, retry=True, horizon=True)
-    return Comparison(setup, runs, environment, stiff_stops(setup))
+        loads.append(load_average() or 0.0)
+    return Comparison(setup, runs, {**environment, "load_average": max(loads)}, stiff_stops(setup))
 
 
 def summary(comparison: Comparison) -> dict[str, Any]:

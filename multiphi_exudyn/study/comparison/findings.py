@@ -17,11 +17,13 @@ from multiphi_exudyn.study.comparison.wording import engineering, listed
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.scene_loads import load_phrases
+from multiphi_exudyn.study.scene.workbench import Setup
 
 __all__ = ["comparison_warnings", "findings"]
 
 TEMPLATE = "findings.txt.j2"
 HEADLINE_ERROR = 0.01  # NRMSE that the headline's model meets, if any model does and the reference is certain enough
+MOST_PLACES = 12  # points whose places are told
 CURVE_TOLERANCE = 0.05  # NRMSE above which a pointwise comparison says little
 
 
@@ -47,6 +49,9 @@ def findings(comparison: Comparison) -> dict[str, tuple[str, ...]]:
         cheapest=cheapest,
         cheapest_worst=max(cheapest, key=lambda run: _error(comparison, run), default=None),
         own=comparison.coarser,
+        places=_places(setup),
+        load=comparison.environment.get("load_average", 0.0),
+        cores=comparison.environment.get("cores", math.inf),
         early=list(_separated(comparison, [*headline, comparison.coarser])),
         followed=[(law, _displacements_beyond_span(comparison, law)) for law in setup.mechanics.force_laws],
         twins=list(_twins(comparison)),
@@ -86,6 +91,16 @@ def _gap_and_stiffness_text(contacts: Sequence[UnilateralContact]) -> str:
     gap = span([1e3 * contact.gap for contact in contacts], "{:g}".format)
     stiffness = [contact.stiffness for contact in contacts]
     return f"gap {gap} mm, {span(stiffness, lambda k: 'rigid' if math.isinf(k) else f'{engineering(k)}N/m')}"
+
+
+def _places(setup: Setup) -> list[str]:
+    """A phrase for each point that is named on a page: where it is on its beam; none of matrices, or of many points."""
+    beams, start = setup.mechanics.beams, setup.scene.file.start
+    started = [] if start is None else [start.load_at, getattr(start, "measured_at", start.load_at)]
+    named = list(dict.fromkeys([*setup.points, *setup.contact_points, *started]))
+    if beams is None or len(named) > MOST_PLACES:
+        return []
+    return [f"{name} {1e3 * beams.points[name][1]:g} mm" for name in named]
 
 
 def _error(comparison: Comparison, run: ModelRun) -> float:

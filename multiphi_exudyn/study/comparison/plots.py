@@ -69,21 +69,28 @@ LOSSES = {  # row of the ledger -> label and colour
 }
 SMALLEST = 1e-5  # of a history's peak: lower end of the axis of differences, unless all differences are smaller
 SPAN = 0.01  # of the largest difference: the axis shows at least those above it
+THIN = 0.6  # edge of a bar or a grey area [points]: an interval of a long run is narrower than a pixel
+WIDEST, NARROWEST = 2.4, 1.0  # of lines [points]
+DOT, DOTS = 2.2, (0.0, (1.0, 4.0))  # width of a dot [points], its length and its distance to the next in widths
 BAR = 0.72  # height of a bar, as a fraction of the distance between rows
 
 
 def styles(comparison: Comparison) -> dict[str, Style]:
-    """Style of each model."""
-    drawn, colours = {}, itertools.cycle(COLOURS)
+    """Style of each model: each line is narrower than those drawn before it, which show beside it where they coincide.
+
+    A user object, which moves as its model does alone, is a row of dots on it.
+    """
+    drawn, colours, width = {}, itertools.cycle(COLOURS), WIDEST
     for name, run in comparison.runs.items():
         if run is comparison.reference:
-            drawn[name] = Style(REFERENCE, MARKERS[run.kind], width=2.0)
+            drawn[name] = Style(REFERENCE, MARKERS[run.kind], width=WIDEST + 1)
         elif run.kind == "full":
-            drawn[name] = Style(FULL, MARKERS[run.kind], width=1.0)
+            drawn[name] = Style(FULL, MARKERS[run.kind], width=NARROWEST)
         elif run.kind == "user-object":
-            drawn[name] = Style(next(colours), MARKERS[run.kind], ":", 2.2)
+            drawn[name] = Style(next(colours), MARKERS[run.kind], DOTS, DOT)
         else:
-            drawn[name] = Style(next(colours), MARKERS[run.kind])
+            drawn[name] = Style(next(colours), MARKERS[run.kind], width=width)
+            width = max(NARROWEST, width - 0.4)
     return drawn
 
 
@@ -242,12 +249,12 @@ def _reduced(comparison: Comparison) -> list[ModelRun]:
 
 def _shade(axes: Axes, spans: np.ndarray) -> None:
     for start, end in spans:
-        axes.axvspan(start, end, color=BAND, lw=0, zorder=0)
+        axes.axvspan(start, end, color=BAND, lw=THIN, zorder=0)
 
 
 def _bars(axes: Axes, intervals: np.ndarray, row: float, style: Style) -> None:
     bars = [(start, end - start) for start, end in intervals]
-    axes.broken_barh(bars, (row - BAR / 2, BAR), color=style.colour, lw=0)
+    axes.broken_barh(bars, (row - BAR / 2, BAR), color=style.colour, lw=THIN)
 
 
 def _detail(axes: Axes, comparison: Comparison, shown: Sequence[ModelRun], point: str) -> None:

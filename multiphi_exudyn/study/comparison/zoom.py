@@ -16,7 +16,7 @@ from multiphi_exudyn.study.running.runs import ModelRun
 
 __all__ = ["histories_to_zoom", "zoom_line", "zoom_plot"]
 
-DASHES: dict[str, list[int]] = {"-": [], ":": [2, 3]}  # pixels
+DOTS = [2, 7]  # pixels of a dot and to the next
 
 
 def histories_to_zoom(comparison: Comparison) -> list[dict[str, Any]]:
@@ -68,4 +68,4 @@ def _plots(comparison: Comparison) -> Iterator[dict[str, Any]]:
 
 def _line(comparison: Comparison, run: ModelRun, values: np.ndarray) -> dict[str, Any]:
     style = styles(comparison)[run.name]
-    return zoom_line(run.name, style.colour, values, width=style.width, dash=DASHES[str(style.line)])
+    return zoom_line(run.name, style.colour, values, width=style.width, dash=[] if style.line == "-" else DOTS)

@@ -13,7 +13,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_info
 
-__all__ = ["environment", "import_times", "machine"]
+__all__ = ["environment", "import_times", "load_average", "machine"]
 
 PACKAGES = ("multiphi-exudyn", "exudyn", "numpy", "scipy")
 IMPORTED = ("multiphi_exudyn", "exudyn")
@@ -28,6 +28,11 @@ def environment() -> dict[str, Any]:
 def import_times() -> dict[str, float | None]:
     """Import time [s] of each package with all its public names in a new interpreter; None for a failure."""
     return {name: _import_time(name) for name in IMPORTED}
+
+
+def load_average() -> float | None:
+    """Load average of the machine over the last minute; None where the system has none."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
 
 
 def machine() -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """The models inside Exudyn in a case: the reduced body as a user object, and the full model.
 
-They use time steps, so the criteria of the native model do not apply to them: only their energy drift and their
-difference to the native run are reported. A run that stops has Exudyn's message.
+They use time steps, so the criteria of the native model do not apply to them. A user object whose modes are matched to
+its step has to agree with the native run; one that has too few steps for that and is as far away has failed. Of a full
+model, which is another model, energy drift and difference are reported. A run that stops has Exudyn's message.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ MATCHED_PER_PERIOD = 3  # steps of the user object in the shortest kept period; 
 STEPS_PER_PERIOD = 200  # of the full model in it
 FEWEST_STEPS = 200
 LARGEST_FULL = 400  # coordinates of a dense full model at most, for the time of a step
-AGREEMENT = 0.01  # of the largest travel: smaller differences count as agreement
+AGREEMENT = 0.01  # of the largest travel, or of its 2-norm: smaller differences count as agreement
 VARYING_LOADS = (HarmonicLoad, SampledLoad, FunctionLoad, SweepLoad)
 MOST_WORDS = 200  # characters of the message of a foreign exception
 
@@ -63,9 +64,22 @@ def run_user_object(problem: Problem, native: Trajectory, most_steps: int, limit
             time_s=time_s,
             warnings=histories.warnings,
         )
-        return _with_difference(outcome, problem, native, histories.time, histories.gaps, histories.slip)
+        compared = _with_difference(outcome, problem, native, histories.time, histories.gaps, histories.slip)
+        return _judged(compared, matched)
 
     return _outcome_of(USER_OBJECT, solve)
+
+
+def _judged(outcome: Outcome, matched: bool) -> Outcome:
+    """A user object's outcome: wrong where it is far from the native run, or failed where its steps are too few."""
+    if outcome.difference is None or outcome.difference <= AGREEMENT:
+        return outcome
+    far = f"differs from native by {100 * outcome.difference:.2g} %"
+    return (
+        replace(outcome, wrong=(far,))
+        if matched
+        else replace(outcome, status=FAILED, message=f"{far}: {outcome.message}")
+    )
 
 
 def run_full_model(problem: Problem, native: Trajectory, values: int, limit_s: float) -> Outcome:

@@ -14,7 +14,7 @@ class Outcome:
     """Result of one model in one case. Quantities that a model does not have are None.
 
     model: its name. status: "ok" | "failed" | "not run"; message: the cause, or a remark. wrong: what makes an answer
-    that is ok wrong (native models only), one sentence each.
+    that is ok wrong (native model and user object), one sentence each.
     energy, residual, missed, beyond [m], excused [m], reported [m]: see judgement.py, beyond being the judged part and
     excused the part due to truncation. energy of an Exudyn model: its drift, where damped or loaded its largest gain.
     difference: to the native answer, ||y - native|| / ||native|| of the contacts' travel, the worst of them;

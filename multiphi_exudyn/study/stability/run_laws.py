@@ -211,7 +211,7 @@ def energy_rise(run: Trajectory, segments: Sequence[Segment], samples: int = 5) 
     left = (run.energy(times.ravel()) - _work(run, times.ravel())).reshape(times.shape)
     rises = np.diff(left.ravel()) if _complete(run) else np.diff(left, axis=1).ravel()
     returned = max((-event.loss.damping for event in run.events), default=0.0)  # by dampers
-    return float(np.max(rises, initial=0.0)) - max(returned, 0.0)
+    return max(0.0, float(np.max(rises, initial=0.0)) - returned)
 
 
 def missed(

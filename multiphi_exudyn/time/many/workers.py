@@ -28,6 +28,7 @@ from multiphi_exudyn.time.run.start import first_start
 from multiphi_exudyn.time.segments.level_rows import point_row
 from multiphi_exudyn.time.simulate import Run, run_with_warnings
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.warnings.model_warnings import advised
 
 __all__ = ["StartVectors", "Task"]
 
@@ -148,7 +149,8 @@ class Task:
                 self._level_warnings[visited] = ModelWarnings.of(model, trajectory.segments).for_run(trajectory)
             before, after = self._level_warnings[visited]
             struck = verdict[1] > 0 and rigid and batch.struck(k)
-            warnings[k] = (*before, *truncation_warnings(model, verdict, tolerance, struck), *after)
+            truncated = truncation_warnings(model, verdict, tolerance, struck)
+            warnings[k] = advised((*before, *truncated, *after), tolerance)
         return warnings
 
     def _finish(self, number: int, run: Run) -> None:

@@ -135,6 +135,8 @@ class Recorded(LazySequence[Segment], Segments):
         c = x[:, :r] @ response.from_displacement.T + v[:, :r] @ response.from_velocity.T
         if level.driven:
             c = c + response.from_force @ level.asymptotic.drive
+        if level.channels.force.any():
+            c = c + x[:, r:] @ level.channels.force.T @ response.from_force.T
         terms = c * (row[:r] @ response.shapes)
         terms = terms + response.basis.derivative(c * (row[n : n + r] @ response.shapes))
         moved = (terms * response.basis.integrals((ends - starts)[:, None])).real.sum()

@@ -1,4 +1,7 @@
-"""Friction warnings: redundant friction, friction decided in turn, and slip that truncation turns backwards.
+"""Friction warnings: redundant contacts and friction, friction decided in turn, slip that truncation turns backwards.
+
+Of rigid contacts whose directions depend linearly on each other an independent set carries the load (events/law). How
+they share it is not unique, and if they rub differently neither is the motion.
 
 Friction without a spring whose row depends linearly on those of sticking friction beside it moves with that friction:
 its force is its kinetic limit, as in slip (events/law). Where one of them has a higher static limit, that one bears
@@ -22,6 +25,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy.optimize
 
 from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
@@ -29,22 +33,93 @@ from multiphi_exudyn.events.transitions.exits import signal_table, state_of
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.round_off import CLEAR, INDEPENDENT
+from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 from multiphi_exudyn.mechanics.elements.element import friction_spring
 from multiphi_exudyn.time.segments.segment import Segments
 
 __all__ = ["friction_warnings"]
 
 SPEED_ROUND_OFF = 1e-9  # of the largest speed: a smaller one against the slip is round-off
+TOUCHES = 1e-10  # of the largest terms of its gap: a contact touches
 BACKWARDS = 0.01  # of the time in slip: a smaller share against the slip gives no warning
 REMEDY = "give one element with the sum of their limits, or each a spring (stiffness, tangential_stiffness)"
 
 
 def friction_warnings(segments: Segments, model: MultiPhiModel) -> Iterator[str]:
     """Warnings of a model with friction, at most one sentence of each kind."""
+    yield from _redundant_contacts(segments)
     yield from _redundant(segments)
     yield from _decided_in_turn(segments)
     if not model.whole:
         yield from _backward_slip(segments)
+
+
+def _redundant_contacts(segments: Segments) -> Iterator[str]:
+    """Warning of a rigid contact that touches without a force, and would rub otherwise than those that carry it."""
+    base = segments.levels[0].level.base
+    rigid = [i for i, contact in enumerate(base.contacts) if isinstance(contact, UnilateralContact) and contact.rigid]
+    if all(_rub_alike(base, rigid[0], i) for i in rigid[1:]):
+        return
+    longest = {k: i for i, k in sorted(enumerate(segments.numbers), key=lambda each: _length(segments, each[0]))}
+    for number, place in sorted(longest.items()):
+        states, touching = segments.levels[number].states, _touching(segments, place, rigid)
+        closed, idle = [i for i in touching if states[i]], [i for i in touching if not states[i]]
+        for i in idle if closed else ():
+            bearing = _relieved(base, i, closed, [k for k in idle if k != i])
+            others = [base.contacts[k].name for k in bearing if not _rub_alike(base, i, k)]
+            if others:
+                yield (
+                    f"redundant contacts: {base.contacts[i].name!r} touches, but {', '.join(map(repr, others))} "
+                    f"{'carries' if len(others) == 1 else 'carry'} the load, and they rub differently: how rigid "
+                    "contacts share a load, and so their friction, is not unique; the run lets the roughest of those "
+                    "that close together carry it; give each of them a stiffness"
+                )
+                return
+
+
+def _length(segments: Segments, place: int) -> float:
+    """Duration [s] of a segment."""
+    return float(segments.ends[place] - segments.starts[place])
+
+
+def _touching(segments: Segments, place: int, contacts: Sequence[int]) -> list[int]:
+    """Those of the rigid contacts whose gaps are round-off in the middle of a segment."""
+    level, after = segments.levels[segments.numbers[place]], 0.5 * _length(segments, place)
+    xi = segments.states(np.array([place]), np.array([after]))[0, 0, : level.width]
+    rows, constants = level.level.gap_rows[contacts], level.gap_constants[contacts]
+    sizes = np.abs(rows) @ np.abs(xi) + np.abs(constants)
+    return [i for i, is_near in zip(contacts, np.abs(rows @ xi + constants) <= TOUCHES * sizes, strict=True) if is_near]
+
+
+def _relieved(base: ModalBase, contact: int, closed: Sequence[int], idle: Sequence[int]) -> list[int]:
+    """Closed contacts (by number) that a force on another one can relieve, as forces on further idle ones may.
+
+    The forces along the rows h have no resultant: h_contact + sum a_k h_k = sum b_k h_k, a >= 0 of the idle ones.
+    """
+    rows = base.directions
+    columns = np.column_stack([-rows[:, list(idle)], rows[:, list(closed)], -rows[:, list(closed)]])
+    shares, remainder = scipy.optimize.nnls(columns, rows[:, contact])
+    if remainder > INDEPENDENT * np.linalg.norm(rows[:, contact]):
+        return []
+    relieved = shares[len(idle) : len(idle) + len(closed)] - shares[len(idle) + len(closed) :]
+    return [k for k, share in zip(closed, relieved, strict=True) if share > INDEPENDENT]
+
+
+def _rub_alike(base: ModalBase, one: int, other: int) -> bool:
+    """Whether the friction of two contacts is the same for the same normal forces."""
+    first, second = base.contacts[one], base.contacts[other]
+    assert isinstance(first, UnilateralContact), "only contacts are compared"
+    assert isinstance(second, UnilateralContact), "only contacts are compared"
+    if (first.friction, first.most) != (second.friction, second.most):
+        return False
+    if not first.most:
+        return True
+    links = [base.link_indices[i][1] for i in (one, other)]
+    (row, its_row), speeds = base.directions[:, links].T, [base.links[k].velocity for k in links]
+    return any(
+        speeds[0] == sign * speeds[1] and np.linalg.norm(row - sign * its_row) <= INDEPENDENT * np.linalg.norm(row)
+        for sign in (1.0, -1.0)
+    )
 
 
 def _redundant(segments: Segments) -> Iterator[str]:

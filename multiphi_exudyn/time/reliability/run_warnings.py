@@ -6,6 +6,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
                               contact forces are off; known before any run
     "truncated friction: ..." levels in which friction sticks with few modes: its force there is off
     "backward slip: ..."      truncated friction that moves against its slip (friction_warnings.py)
+    "redundant contacts: ..." rigid contacts that share a load and rub differently (friction_warnings.py)
     "redundant friction: ..." friction whose share of the load, and begin of slip, is not unique (friction_warnings.py)
     "friction in turn: ..."   friction at rigid contacts that is decided in an order (friction_warnings.py)
     "several impacts: ..."    an impact with friction for which Coulomb's law has several solutions (impact_warnings.py)
@@ -20,6 +21,9 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "base: ..."               motion or loads outside the base of a large structure (base_warnings.py)
     "slow mode: ..."          a mode whose period is so long that its motion under loads is lost in round-off
     "load pieces: ..."        loads of so many samples or pieces that the run takes long
+    "coarse steps: ..."       steps of Exudyn that are long for modes not matched to them
+    "turning: ..."            a body in Exudyn that turns beyond the linear range, or may do so unseen; a rigid
+    "rigid interface ...:"    interface of it that does
     "slow model: ..."         modes that hardly begin to move in the run: matrices swapped, or units mixed
 """
 
@@ -45,6 +49,7 @@ from multiphi_exudyn.time.reliability.truncation_warnings import energy_warning,
 from multiphi_exudyn.time.segments.segment import Segments
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from multiphi_exudyn.time.warnings.model_warnings import (
+    advised,
     cluster_warnings,
     damping_warnings,
     missing_modes,
@@ -83,9 +88,9 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     if tolerance is not None or not (share >= 0 and error >= 0):
         share, error = verdict_of(trajectory, tolerance)
     if not (share > 0 or error > 0):
-        return before + after
+        return advised((*before, *after), tolerance)
     struck = general.rigid and error > 0 and _struck(trajectory)
-    return before + truncation_warnings(model, (share, error), tolerance, struck) + after
+    return advised((*before, *truncation_warnings(model, (share, error), tolerance, struck), *after), tolerance)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from multiphi_exudyn.display import names
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -23,10 +25,13 @@ def history_figure(
     forces: Mapping[str, np.ndarray],
     intervals: Mapping[str, Sequence[tuple[float, float]]],
 ) -> Figure:
-    """Panels over times (k,) [s]: displacements [m] by point, forces [N] by contact; intervals [s] of the latter."""
+    """Panels over times (k,) [s]: displacements by point, forces by contact, in the structure's own units.
+
+    intervals: what holds in the times [s] drawn grey -> these, such as "stop closed".
+    """
     from matplotlib.figure import Figure
 
-    panels = [(displacements, "displacement [m]"), *(((forces, "force [N]"),) if forces else ())]
+    panels = [(displacements, "displacement"), *(((forces, "force"),) if forces else ())]
     figure = Figure(figsize=(SIZE[0], SIZE[1] * len(panels)), layout="constrained")
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (curves, label) in zip(axes, panels, strict=True):
@@ -37,7 +42,7 @@ def history_figure(
         axis.margins(x=0)
         if curves:
             axis.legend(loc="upper right", frameon=False, ncols=3)
-    axes[-1].set_xlabel("time [s]" + (f"; grey: {', '.join(intervals)} closed or sticking" if intervals else ""))
+    axes[-1].set_xlabel("time [s]" + (f"; grey: {names(list(intervals))}" if intervals else ""))
     return figure
 
 

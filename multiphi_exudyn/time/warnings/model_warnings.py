@@ -9,16 +9,24 @@ import numpy as np
 
 from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.levels.level.level import Level
-from multiphi_exudyn.levels.model.mode_choice import CONTACT_SHARE
+from multiphi_exudyn.levels.model.mode_choice import CONTACT_SHARE, Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.structures.damping import ModalDamping
 from multiphi_exudyn.mechanics.structures.modal_structure import ModalStructure
 
-__all__ = ["REMEDY", "cluster_warnings", "damping_warnings", "missing_modes", "static_warnings"]
+__all__ = ["REMEDY", "advised", "cluster_warnings", "damping_warnings", "missing_modes", "static_warnings"]
 
 PER_CENT = 0.5  # a ratio of a structure is mostly below 0.1, and half of critical damping hardly leaves an oscillation
 STICKING = 8  # modes of a level in which friction sticks: with so many its force is right to 5 % on the rig's beam
 REMEDY = "give the model more modes, or modes=Tolerance(0.01)"
+
+
+def advised(sentences: Sequence[str], tolerance: Tolerance | None) -> tuple[str, ...]:
+    """Sentences of a run, with another remedy than a tolerance where one has decided the modes."""
+    if tolerance is None:
+        return tuple(sentences)
+    smaller = f"give Tolerance an error below {tolerance.error:g}, or the model a larger number of modes"
+    return tuple(sentence.replace(REMEDY, smaller) for sentence in sentences)
 
 
 def static_warnings(levels: Sequence[Level]) -> Iterator[str]:
@@ -103,14 +111,14 @@ def _contact_frequency(model: MultiPhiModel, contacts: Sequence[int], highest: f
 
 
 def cluster_warnings(levels: Sequence[Level]) -> list[str]:
-    """One sentence where some of these levels keep more modes than requested."""
+    """One sentence where some of these levels keep more modes than the number given or chosen."""
     kept = [level for level in levels if level.kept_beyond]
     if not kept:
         return []
     most = max(kept, key=lambda level: level.kept_beyond)
     count, name = most.modes - most.kept_beyond, ", ".join(most.closed) or "open"
     return [
-        f"cluster: {len(kept)} of {len(levels)} levels keep more modes than asked for, level ({name}) {most.modes} in "
-        f"place of {count}, as a cut between modes of one frequency ({most.frequencies[count - 1]:.6g} Hz) would be "
-        f"arbitrary; ask for {most.modes} modes"
+        f"cluster: {len(kept)} of {len(levels)} levels keep more modes than the number given or chosen, level ({name}) "
+        f"{most.modes} in place of {count}, as a cut between modes of one frequency "
+        f"({most.frequencies[count - 1]:.6g} Hz) would be arbitrary; modes={most.modes} says so"
     ]

@@ -11,7 +11,7 @@ from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.body.solver.switching import bodies_of
 from multiphi_exudyn.exudyn_plugin.body.state.coordinates import SAME_STEP, Coordinates
 
-__all__ = ["check_integration", "check_matched", "check_start"]
+__all__ = ["check_integration", "check_level", "check_matched", "check_start"]
 
 ROUND_OFF = 1e-12  # of the energy at the start: an impact with a smaller loss is none
 
@@ -31,6 +31,19 @@ def check_matched(body: CheckedBody, step: float) -> None:
         raise MultiPhiValueError(
             f"matchedStepSize of {body.name!r}: got {body.matched_step:g} s and a solver's step of "
             f"{step:g} s, need the same (beside Exudyn's own contacts set discontinuous.useRecommendedStepSize=False)"
+        )
+
+
+def check_level(body: CheckedBody, states: tuple[int, ...], last_states: tuple[int, ...], last: np.ndarray) -> None:
+    """Raise for a start at the coordinates (s,) of the last solution in another level than its own.
+
+    states, last_states: of the elements at the start, and in the last solution.
+    """
+    if states != last_states and np.array_equal(body.coordinates.views[0], last):
+        raise MultiPhiValueError(
+            f"start of {body.name!r}: got the coordinates of the last solution without its level, need its whole "
+            "state: updateInitialValues=True, or "
+            "mbs.systemData.SetSystemState(mbs.systemData.GetSystemState(), exu.ConfigurationType.Initial)"
         )
 
 

@@ -3,7 +3,8 @@
 Exudyn wraps an error that a body raises during a run in an error about user functions. Therefore SolveDynamic checks
 beforehand, as a method of the system and as a function of Exudyn's modules, and so does the explicit solver when it is
 called itself; errors of bodies during a run are raised without Exudyn's wrapping. Any run of the implicit solver in
-which the bodies were not called up to its end raises an error at its end.
+which the bodies were not called up to its end raises an error at its end. A static solution is repeated until the
+levels of the bodies agree with it (static_solution.py).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import exudyn.solver
 
 from multiphi_exudyn.errors import MultiPhiError
 from multiphi_exudyn.exudyn_plugin.body.solver.run_checks import check_integration
+from multiphi_exudyn.exudyn_plugin.body.solver.static_solution import solve_static
 from multiphi_exudyn.exudyn_plugin.body.solver.switching import BODIES, check_solver
 
 __all__ = ["install_checks"]
@@ -36,6 +38,7 @@ def install_checks() -> None:
     for solver, wrapper in (
         (exu.MainSolverImplicitSecondOrder, _with_end_check),
         (exu.MainSolverExplicit, _with_refusal),
+        (exu.MainSolverStatic, _with_levels),
     ):
         if not hasattr(solver.SolveSystem, _CHECKED):
             solver.SolveSystem = wrapper(solver.SolveSystem)
@@ -75,7 +78,36 @@ def _with_end_check(solve: Callable[..., Any]) -> Callable[..., Any]:
             raise
         if solver.output.finishedSuccessfully:
             bodies.check_called(solver.it.currentTime)
+            if not bodies.is_required:  # linear bodies are not called
+                settings = arguments[0] if arguments else keywords["simulationSettings"]
+                bodies.take_steps(
+                    solver.it.currentTime - settings.timeIntegration.startTime, solver.it.currentStepIndex
+                )
         return result
+
+    setattr(solve_system, _CHECKED, True)
+    return solve_system
+
+
+def _with_levels(solve: Callable[..., Any]) -> Callable[..., Any]:
+    @functools.wraps(solve)
+    def solve_system(solver: Any, mbs: Any, *arguments: Any, **keywords: Any) -> Any:
+        bodies = mbs.variables.get(BODIES)
+        if bodies is None or not bodies.is_required:
+            return solve(solver, mbs, *arguments, **keywords)
+
+        def solve_once() -> bool:
+            bodies.begin_run()
+            done = bool(solve(solver, mbs, *arguments, **keywords))
+            if done:
+                bodies.check_called(solver.it.currentTime)
+            return done
+
+        with _unwrapped_errors():
+            done = solve_static(solve_once, bodies.values())
+        if done:
+            bodies.warn()
+        return done
 
     setattr(solve_system, _CHECKED, True)
     return solve_system

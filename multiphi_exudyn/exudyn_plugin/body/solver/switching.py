@@ -17,6 +17,7 @@ from typing import Any, Protocol
 import exudyn as exu
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.exudyn_plugin.body.solver.static_solution import StaticChange
 from multiphi_exudyn.time.warnings.warning_groups import CALLER, issue
 
 __all__ = ["BODIES", "Switching", "SwitchingBody", "bodies_of", "check_solver", "is_isolated", "running_solver"]
@@ -56,6 +57,25 @@ class SwitchingBody(Protocol):
 
     def restart_step(self) -> None:
         """Take the present state as the start of the next step."""
+
+    def take_steps(self, duration: float, step: float) -> None:
+        """Take notice of a run of this duration in steps of this length [s]."""
+
+    def end_run(self) -> None:
+        """Act at the end of a run."""
+
+    @property
+    def elements(self) -> int:
+        """Number of contacts, force laws and friction elements."""
+
+    def begin_static(self) -> None:
+        """Begin a static solution."""
+
+    def static_changes(self) -> list[StaticChange]:
+        """Changes of elements whose states do not agree with the static solution."""
+
+    def change_static_level(self, change: StaticChange) -> None:
+        """Take the state of an element in the next static solution."""
 
 
 class Clock:
@@ -120,7 +140,9 @@ class Switching(dict[str, SwitchingBody]):
         self.others_disturbed = False
         if t >= self.end_time:
             self.end_time = math.inf
-            self._warn()
+            for body in self.values():
+                body.end_run()
+            self.warn()
         elif self.user_post_step is None:
             self.clock.next_time = min([self.end_time, *[body.next_time for body in self.values()]])
             tests = [test for body in self.values() if (test := body.is_step_clear) is not None]
@@ -136,6 +158,12 @@ class Switching(dict[str, SwitchingBody]):
             math.inf,
         )
 
+    def take_steps(self, duration: float, count: int) -> None:
+        """Take notice of a run of this duration [s] in so many steps, in which the bodies were not called; warn."""
+        for body in self.values():
+            body.take_steps(duration, duration / max(count, 1))
+        self.warn()
+
     def check_called(self, t: float) -> None:
         """Raise if a run has reached t [s] without calls of the bodies: another PostStep function is installed."""
         if self.is_required and not self.clock.time >= t:
@@ -144,8 +172,8 @@ class Switching(dict[str, SwitchingBody]):
                 "its events; need yours set before CreateMultiPhiBody, then both are called"
             )
 
-    def _warn(self) -> None:
-        """Issue the warnings of the bodies about the run."""
+    def warn(self) -> None:
+        """Issue the warnings of the bodies about the run or the static solution."""
         for body in self.values():
             issue((f"{sentence} (body {body.name!r})" for sentence in body.warnings), CALLER + 1)
 

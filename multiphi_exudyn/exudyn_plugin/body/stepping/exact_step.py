@@ -6,7 +6,8 @@
 The forces of constraints at the end of a step are not used: the trapezoidal rule makes them alternate, and only their
 mean is right. To find what the event changes in the system, the states right before and right after it are written into
 it (surroundings.py). An impact is one of the body together with all that is attached to its interface
-(attached_inertia.py), which then follows the body.
+(attached_inertia.py). At the end of the step, body and attached parts get one velocity at the points, with equal and
+opposite impulses.
 """
 
 from __future__ import annotations
@@ -109,15 +110,17 @@ def exact_step(body: BodyInStep, mbs: Any, motion: ExactMotion, step: Step) -> O
         forces = _level_forces(body, lambda states: force if states == start.states else later.in_level(states))
         motion.set_forces(forces, at_event.inertia)
         first = motion.advance(state, step.start_time, step.end_time, stop=True)
-    end, later = _advance_to_end(body, motion, first, later, step.end_time)
-    _write(body, mbs, end.state, later.in_level(end.state.states), step.end_time)
-    largest_energy = step.largest_energy
+    jump = _point_jump(body, at_event, first, force, later)
+    end, later, jumps = _advance_to_end(body, motion, first, later, step.end_time, jump)
+    force_at_end, largest_energy = later.in_level(end.state.states), step.largest_energy
+    end_state = at_event.joined(end.state, force_at_end, instant, change, jumps)
+    _write(body, mbs, end_state, force_at_end, step.end_time)
     if coordinates.interface is not None:
         force_at_end = at_event.force_at_step_end(mbs, instant, change)
-        error = force_at_end - later.in_level(end.state.states)
-        largest_energy = _check_resolved(body, at_event, step, instant, old, end.state, error)
-        _write(body, mbs, end.state, force_at_end, step.end_time)
-    return Outcome(end.state, disturbs_others=coordinates.interface is not None, largest_energy=largest_energy)
+        error = force_at_end - later.in_level(end_state.states)
+        largest_energy = _check_resolved(body, at_event, step, instant, old, end_state, error)
+        _write(body, mbs, end_state, force_at_end, step.end_time)
+    return Outcome(end_state, disturbs_others=coordinates.interface is not None, largest_energy=largest_energy)
 
 
 @dataclass(frozen=True)
@@ -141,20 +144,42 @@ class _ForcesAfterEvent:
 
 
 def _advance_to_end(
-    body: BodyInStep, motion: ExactMotion, first: AdvanceResult, later: _ForcesAfterEvent, until: float
-) -> tuple[AdvanceResult, _ForcesAfterEvent]:
-    """Advance from the first event to the end of the step, with all further events; result and forces at the end."""
+    body: BodyInStep,
+    motion: ExactMotion,
+    first: AdvanceResult,
+    later: _ForcesAfterEvent,
+    until: float,
+    jumps: np.ndarray,
+) -> tuple[AdvanceResult, _ForcesAfterEvent, np.ndarray]:
+    """Advance from the first event to the end of the step, with all further events; result and forces at the end.
+
+    jumps: of y' (m,) of the points at the first event; those at all further events are added.
+    """
     start, has_friction = first, body.coordinates.has_friction
     while start.time < until:
+        before = later
         motion.set_forces(_level_forces(body, later.in_level), later.around.inertia)
-        result = motion.advance(start.state, start.time, until, stop=has_friction, trial=has_friction)
+        result = motion.advance(start.state, start.time, until, stop=True, trial=has_friction)
         if has_friction:
             if result.changed:
                 later = later.after_event(result.state_before)
                 motion.set_forces(_level_forces(body, later.in_level), later.around.inertia)
             result = motion.advance(start.state, start.time, until, stop=True)
+        if result.changed:
+            force = before.in_level(result.state_before.states)
+            jumps = jumps + _point_jump(body, later.around, result, force, later)
         start = result
-    return start, later
+    return start, later, jumps
+
+
+def _point_jump(
+    body: BodyInStep, around: Surroundings, result: AdvanceResult, force: np.ndarray, later: _ForcesAfterEvent
+) -> np.ndarray:
+    """Jump of y' (m,) of the points at the last event of a result; force, later: (p, f) before and after it."""
+    if around.inertia is None:
+        return np.zeros(body.coordinates.point_count)
+    before, after = result.state_before, result.state
+    return around.point_velocity(after, later.in_level(after.states)) - around.point_velocity(before, force)
 
 
 def _level_forces(

@@ -67,7 +67,7 @@ class StepwiseRun:
         interface = self._body.coordinates.interface
         return (
             self._record_angles_and_test
-            if interface is not None and interface.has_rotations
+            if interface is not None and interface.shows_rotations
             else self._test.is_step_clear
         )
 
@@ -133,7 +133,7 @@ class StepwiseRun:
         self._test.begin(time, np.concatenate([x, self.state.held, *channels]), armed)
 
     def _record_angles_and_test(self, t: float) -> int:
-        """``is_step_clear`` of a body whose interface has rotations, whose angles are recorded."""
+        """``is_step_clear`` of a body whose interface shows how it turns, which is recorded."""
         assert self._body.coordinates.interface is not None
         self._body.coordinates.interface.record_angles()
         return self._test.is_step_clear(t)

@@ -148,6 +148,34 @@ class Surroundings:
         system.move_parts(self.parts, np.array([q, v + instant.elapsed * change]))
         return coordinates.forces_from_accelerations(system.accelerations(instant.step)).forces
 
+    def point_velocity(self, state: State, force: np.ndarray) -> np.ndarray:
+        """y' (m,) of the points in a state of the body, as the solver has it; force: (p, f)."""
+        interface, stepped = self.body.coordinates.interface, self.body.stepped_level(state.states)
+        assert interface is not None
+        q_t = stepped.solver_state(state.displacement, state.velocity, force[: stepped.size])[1]
+        return np.asarray(interface.map_in(stepped).rows @ q_t)
+
+    def joined(self, state: State, force: np.ndarray, instant: Instant, change: np.ndarray, jumps: np.ndarray) -> State:
+        """State at the end of the step in which the body and what is attached to its points have one velocity there.
+
+        The solver's step moves the attached parts, and the exact step the body. Where the step is long for the body's
+        modes, or the force changes within it, their velocities differ at the points. They become one as in an impact,
+        with equal and opposite impulses. If the parts followed the body instead, a heavy part would take over every
+        vibration of a light body.
+
+        force: (p, f) in this state. change: of accelerations (n,) at the first event. jumps: of y' (m,) at all events,
+        in which the attached parts take part.
+        """
+        interface, stepped = self.body.coordinates.interface, self.body.stepped_level(state.states)
+        if self.inertia is None or interface is None:
+            return state
+        of_parts = self.undisturbed[1] + instant.elapsed * change
+        difference = self.point_velocity(state, force) - of_parts[interface.indices] - jumps
+        r, velocity = stepped.modes, state.velocity.copy()
+        rows = interface.map_in(stepped).rows[:, :r] @ stepped.from_velocity[:r, :r]
+        velocity[:r] += self.inertia.joining(rows, difference)
+        return replace(state, velocity=velocity)
+
     def kinetic_energy(self, state: State) -> float:
         """Kinetic energy [J] of the body and of the parts attached to its points."""
         if self.parts is None or self.inertia is None:

@@ -43,7 +43,7 @@ def moved_directions(
     if moved.shape[1] in (0, len(mass)):
         return None
     others = shapes @ scipy.linalg.null_space(moved.T)
-    return scipy.linalg.null_space((mass @ others).T), others
+    return _drop_small(scipy.linalg.null_space((mass @ others).T), ROUND_OFF), others
 
 
 def _drop_small(values: np.ndarray, smallest: float) -> np.ndarray:

@@ -16,7 +16,7 @@ from exudyn.advancedUtilities import NumericalJacobian
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 
-__all__ = ["coordinate_row", "default_points", "gap_row", "requested_points"]
+__all__ = ["coordinate_row", "default_points", "gap_row", "moved_by", "requested_points"]
 
 HELD = 1e-9  # of a row's largest entry before projection: a smaller row is a point that constraints fix
 
@@ -36,8 +36,11 @@ def gap_row(mbs: Any, index: Any) -> np.ndarray:
     return np.asarray(NumericalJacobian(mbs, lambda: np.atleast_1d(mbs.GetObjectOutput(index, gap)), indices)[0])
 
 
-def default_points(mbs: Any, basis: np.ndarray) -> dict[str, np.ndarray]:
-    """Rows (n,) of all markers and node coordinates that can move, by their own names."""
+def default_points(mbs: Any, basis: np.ndarray, prescribed: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    """Rows (n,) of all markers and node coordinates that can move, by their own names.
+
+    prescribed (k, n_full): directions of prescribed motions; what they move is not determined by z alone, and no point.
+    """
     rows: dict[str, np.ndarray] = {}
     for i in range(mbs.systemData.NumberOfMarkers()):
         marker = exu.MarkerIndex(i)
@@ -48,7 +51,14 @@ def default_points(mbs: Any, basis: np.ndarray) -> dict[str, np.ndarray]:
         _add(rows, marker_rows)
     for i in range(mbs.systemData.NumberOfNodes()):
         _add(rows, _node_rows(mbs, exu.NodeIndex(i)))
-    return {name: row @ basis for name, row in rows.items() if _moves(row, basis)}
+    return {name: row @ basis for name, row in rows.items() if _moves(row, basis) and not moved_by(row, prescribed)}
+
+
+def moved_by(row: np.ndarray, prescribed: np.ndarray | None) -> bool:
+    """Whether prescribed motions in directions (k, n_full) move a row (n_full,) beyond round-off."""
+    if prescribed is None or not prescribed.size:
+        return False
+    return bool(np.max(np.abs(prescribed @ row)) > HELD * np.max(np.abs(prescribed)) * np.max(np.abs(row)))
 
 
 def _add(rows: dict[str, np.ndarray], new: Mapping[str, np.ndarray]) -> None:
@@ -60,14 +70,25 @@ def _add(rows: dict[str, np.ndarray], new: Mapping[str, np.ndarray]) -> None:
         rows[name] = row
 
 
-def requested_points(mbs: Any, points: Mapping[str, Any], basis: np.ndarray) -> dict[str, np.ndarray]:
-    """Rows (n,) of requested points; raise MultiPhiValueError or MultiPhiTypeError for one that does not exist."""
+def requested_points(
+    mbs: Any, points: Mapping[str, Any], basis: np.ndarray, prescribed: np.ndarray | None = None
+) -> dict[str, np.ndarray]:
+    """Rows (n,) of requested points; raise MultiPhiValueError or MultiPhiTypeError for one that does not exist.
+
+    prescribed (k, n_full): directions of prescribed motions, which may not move a point.
+    """
     if not isinstance(points, Mapping):
         needed = "{name: marker index or (node index, coordinate number)}"
         raise MultiPhiTypeError(f"points: got {type(points).__name__}, need {needed}")
     rows: dict[str, np.ndarray] = {}
     for name, place in points.items():
         _add(rows, _requested_rows(mbs, name, place))
+    for name, row in rows.items():
+        if moved_by(row, prescribed):
+            raise MultiPhiValueError(
+                f"points[{name!r}]: got a place that a prescribed motion moves, need others; the displacement of all "
+                "coordinates is Reduction.displacement"
+            )
     return {name: row @ basis for name, row in rows.items()}
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from multiphi_exudyn.exudyn_plugin.convert.items.items import (
     DAMPER_EXT,
     Item,
@@ -61,11 +63,17 @@ def taken_objects(objects: Sequence[Mapping[str, Any]], contacts: Collection[str
 
 
 def left_out_objects(
-    objects: Sequence[Mapping[str, Any]], contacts: Collection[str], frictions: Mapping[int, str]
+    objects: Sequence[Mapping[str, Any]],
+    contacts: Collection[str],
+    frictions: Mapping[int, str],
+    motions: Mapping[int, str],
 ) -> Iterator[tuple[Item, str]]:
-    """Objects that the model does not contain, or not completely, with the reason; frictions: reasons for friction."""
+    """Objects that the model does not contain, or not completely, with the reason.
+
+    frictions, motions: reasons why friction or a prescribed motion is left out, empty for a motion that is taken.
+    """
     for i, item in enumerate(objects):
-        reason = _reason(item, contacts, frictions.get(i, ""))
+        reason = _reason(item, contacts, frictions.get(i, ""), motions.get(i))
         if reason:
             yield _object_item(i, item), reason
 
@@ -115,7 +123,7 @@ def _object_item(index: int, item: Mapping[str, Any], became: str = "") -> Item:
     return Item(item["name"], index, f"Object{item['objectType']}", became)
 
 
-def _reason(item: Mapping[str, Any], contacts: Collection[str], friction: str) -> str:
+def _reason(item: Mapping[str, Any], contacts: Collection[str], friction: str, motion: str | None) -> str:
     """Reason why an object, or a part of it, is left out; empty if it is not."""
     if not is_active(item):
         return INACTIVE
@@ -129,15 +137,17 @@ def _reason(item: Mapping[str, Any], contacts: Collection[str], friction: str) -
         return FIXED_FRICTION
     if item["objectType"] in _ONE_SIDED:
         return _ONE_SIDED[item["objectType"]]
-    if is_constraint(item) and (user_function(item).startswith("offset") or _prescribes_velocity(item)):
-        return "the motion it prescribes; its coordinate is held where it is"
+    if motion == "":
+        return ""
+    if motion is not None or (is_constraint(item) and _prescribes_velocity(item)):
+        return f"the motion it prescribes{f', {motion}' if motion else ''}; its coordinate is held where it is"
     if user_function(item):
         return USER_FUNCTION
     return ""
 
 
 def _prescribes_velocity(item: Mapping[str, Any]) -> bool:
-    return bool(item.get("velocityLevel", False)) and bool(item.get("offset", 0.0))
+    return bool(item.get("velocityLevel", False)) and bool(np.any(item.get("offset", 0.0)))
 
 
 def _role(item: Mapping[str, Any], contacts: Collection[str]) -> str:

@@ -21,6 +21,7 @@ __all__ = [
     "has_contact",
     "has_friction",
     "has_limit_stops",
+    "has_own_coordinates",
     "is_active",
     "is_constraint",
     "is_contact",
@@ -42,6 +43,7 @@ _CONTACT_LAW = {  # of a linear spring on one side
     "contactPlasticityRatio": ("plasticity ratio", 0),
 }
 _CONSTRAINTS = ("Joint", "ConnectorDistance")
+_SLIDING = {"JointSliding", "JointSliding2D", "JointALEMoving2D"}  # joints with a place along cables of their own
 _COORDINATE_CONSTRAINTS = {"ConnectorCoordinate", "ConnectorCoordinateVector"}
 
 
@@ -117,6 +119,11 @@ def is_constraint(item: Mapping[str, Any]) -> bool:
     """True for a joint or another connector that is a constraint."""
     kind = str(item["objectType"])
     return kind.startswith(_CONSTRAINTS) or kind in _COORDINATE_CONSTRAINTS
+
+
+def has_own_coordinates(item: Mapping[str, Any]) -> bool:
+    """True for an active joint whose place along cables is a coordinate of its own, which no linear structure has."""
+    return item["objectType"] in _SLIDING and is_active(item)
 
 
 def is_sphere_contact(item: Mapping[str, Any]) -> bool:

@@ -96,7 +96,8 @@ class LinearRange:
         check = self.check(trajectory)
         evaluated = self._evaluated if check.error > SAME or check.reason else ()
         unmoved = self._unmoved if check.softest < 0 or check.reason else ()
-        left_out = _left_out_warnings((*self._left_out, *evaluated, *unmoved))
+        start = self._start if self._linear.shift > SAME * self._largest(trajectory) else ()
+        left_out = _left_out_warnings((*self._left_out, *start, *evaluated, *unmoved))
         return (*left_out, *_damper_warnings(trajectory), *check.sentences)
 
     def __copy__(self) -> LinearRange:
@@ -106,18 +107,37 @@ class LinearRange:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return LinearLimits, ((*self._left_out, *self._evaluated, *self._unmoved), *self._limits)
+        return LinearLimits, ((*self._left_out, *self._start, *self._evaluated, *self._unmoved), *self._limits)
+
+    @property
+    def _start(self) -> tuple[str, ...]:
+        """The part that a start moved onto the constraints leaves out, if it is moved beyond round-off."""
+        linear = self._linear
+        if not linear.shift > ROUND_OFF * linear.largest:
+            return ()
+        return (
+            f"the violation of {', '.join(linear.violated)} at the start: the model starts where constraints are met, "
+            f"up to {linear.shift:.3g} m or rad away, as Exudyn's generalized-alpha solver does in its first step, and "
+            "TrapezoidalIndex2 does not",
+        )
+
+    def _largest(self, trajectory: Trajectory) -> float:
+        """Largest displacement [m, rad] of a coordinate from the start."""
+        samples, z, _ = _sampled(trajectory)
+        moved = np.transpose([self._linear.prescribed(t) for t in samples])
+        return float(np.max(np.abs(self._linear.basis @ z + moved)))
 
     def check(self, trajectory: Trajectory) -> RangeCheck:
         """Error of a trajectory of this model at a few times."""
         samples, z, z_t = _sampled(trajectory)
         linear = self._linear
-        sizes, speeds = linear.size(z), linear.size(z_t)
+        sizes = np.hypot(linear.size(z), [linear.prescribed_size(t) for t in samples])
+        speeds = np.hypot(linear.size(z_t), [linear.prescribed_size(t, 1) for t in samples])
         spread = np.linspace(0.0, trajectory.t_end, (DENSE if self._evaluated else SPREAD) + 1)[1:]
         extremes = samples[np.argmax(sizes)], samples[np.argmax(speeds)]
         times = np.unique([*spread, *extremes, *_closings(trajectory, linear.spheres)])
-        largest = float(np.max(np.abs(linear.basis @ z)))
-        if not largest > ROUND_OFF * linear.largest:
+        largest = self._largest(trajectory)
+        if not largest > ROUND_OFF * linear.largest or not np.max(sizes) > 0:
             return RangeCheck(times, np.zeros(len(times)))
         if reason := self._changed():
             return RangeCheck(times, np.zeros(len(times)), reason)
@@ -136,9 +156,9 @@ class LinearRange:
                 )
                 for t in times
             ]
-            impact_errors = [compared.impact_error(trajectory.displacement(t), largest) for t in times]
+            impact_errors = [compared.impact_error(trajectory.displacement(t), largest, t) for t in times]
             stiffness = np.mean(
-                [compared.unmoved_stiffness(trajectory.displacement(t), largest) for t in spread], axis=0
+                [compared.unmoved_stiffness(trajectory.displacement(t), largest, t) for t in spread], axis=0
             )
         errors, deviations = (np.array(parts) for parts in zip(*comparisons, strict=True))
         errors = np.maximum(errors, impact_errors)
@@ -160,6 +180,8 @@ class LinearRange:
     def _limits(self) -> tuple[np.ndarray, np.ndarray, str]:
         """Rows and limits of LinearLimits, and the reason if there are none."""
         linear, reason = self._linear, self._changed()
+        if linear.moved and not reason:
+            reason = "constraints of its Exudyn system prescribe a motion, which a pickled model cannot evaluate"
         squares, shapes = linear.modes
         rows = (linear.mass @ shapes[:, :LIMITED_MODES]).T
         limits = [] if reason else [self._limit(squares[i], shapes[:, i]) for i in range(len(rows))]

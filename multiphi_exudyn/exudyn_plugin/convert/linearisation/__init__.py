@@ -1,4 +1,5 @@
 """Linearisation: M, C, K and loads of an Exudyn system about its current state.
 
-Order: geometric_stiffness, full_system, timed_loads, linearisation, matrix_checks.
+Order: geometric_stiffness, constraints, full_system, timed_loads, prescribed_motion, linearisation, matrix_checks,
+start_state.
 """

@@ -1,10 +1,12 @@
 """Accelerations of an Exudyn system without its contacts, at any coordinates and velocities.
 
-    M(q) a = f(q, v) + force - C(q)^T mu,   C(q) a = -(d C(q)/dt) v,   g(q) = g(q_0),   C(q) v = C(q_0) v_0
+    M(q) a = f(q, v) + force - C(q)^T mu,   C(q) a = -(d C(q)/dt) v + C(q_0) s''
+    g(q, t) = g(q_0, t_0),   C(q) v = C(q_0) (v_0 + s' - s'_0)
 
 q, v, a (n_full,) coordinates [m, rad], velocities and accelerations, f [N, N m] all forces but those of constraints,
-contacts, limit stops and friction, g (m,) the constraints, C their Jacobian, mu their multipliers. Coordinates that
-violate the constraints are first moved onto them by the shift of least norm in M.
+contacts, limit stops and friction, g (m,) the constraints on positions, C (m, n_full) the Jacobian of all, mu their
+multipliers, s (n_full,) the motion that they prescribe. Coordinates that violate the constraints are first moved onto
+them by the shift of least norm in M.
 """
 
 from __future__ import annotations
@@ -19,9 +21,11 @@ import numpy as np
 
 from multiphi_exudyn.exudyn_plugin.convert.items.directions import Directions
 from multiphi_exudyn.exudyn_plugin.convert.items.items import contact_parameters, user_function, value_key
+from multiphi_exudyn.exudyn_plugin.convert.linearisation.constraints import on_velocities, residuals
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.geometric_stiffness import (
     constraint_jacobian,
     generalised_forces,
+    mass_matrix,
     static_solver,
 )
 
@@ -101,8 +105,9 @@ class FullSystem:
         self._mbs, self._solver = mbs, solver
         self._set(displacement, velocity)
         self._start = displacement, velocity
-        self._constraints = self._residual()
-        self._constraint_velocity = constraint_jacobian(mbs, solver) @ velocity
+        self._start_jacobian = constraint_jacobian(mbs, solver)
+        self._of_velocity = on_velocities(mbs, solver, self._start_jacobian)
+        self._constraints = residuals(mbs, solver)
 
     @classmethod
     @contextmanager
@@ -127,26 +132,38 @@ class FullSystem:
         return sphere_gap(self._mbs, index)
 
     def accelerations_at(
-        self, displacement: np.ndarray, velocity: np.ndarray, force: np.ndarray, scale: float
+        self,
+        displacement: np.ndarray,
+        velocity: np.ndarray,
+        force: np.ndarray,
+        scale: float,
+        prescribed: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> ConstrainedState:
-        """The system at q, v, (n_full,), under an additional force; scale: largest |q - q_0| of the motion."""
+        """The system at q, v, (n_full,), under an additional force; scale: largest |q - q_0| of the motion.
+
+        prescribed: s' - s'_0 and s'' (n_full,), None for zero.
+        """
         zero = np.zeros(len(displacement))
+        speed_change, driven = (zero, zero) if prescribed is None else prescribed
         self._set(displacement, self._start[1])
         directions = Directions(self._jacobian(), self._mass())
-        shift = directions.solve(zero, self._constraints - self._residual())
+        left = np.where(self._of_velocity, 0.0, self._constraints - residuals(self._mbs, self._solver))
+        shift = directions.solve(zero, left)
         self._set(displacement + shift, velocity)
         jacobian = self._jacobian()
         directions = Directions(jacobian, self._mass())
-        velocity = velocity + directions.solve(zero, self._constraint_velocity - jacobian @ velocity)
+        needed = self._start_jacobian @ (self._start[1] + speed_change)
+        velocity = velocity + directions.solve(zero, needed - jacobian @ velocity)
         rate = self._jacobian_rate(displacement + shift, velocity, scale)
         self._set(displacement + shift, velocity)
         forces = generalised_forces(self._mbs, self._solver) + force
-        return ConstrainedState(directions.size(shift), directions.solve(forces, -rate))
+        accelerations = directions.solve(forces, self._start_jacobian @ driven - rate)
+        return ConstrainedState(directions.size(shift), accelerations)
 
     def _jacobian_rate(self, displacement: np.ndarray, velocity: np.ndarray, scale: float) -> np.ndarray:
         """(d C/dt) v by central differences."""
         fastest = np.max(np.abs(velocity))
-        count = len(self._constraint_velocity)
+        count = len(self._start_jacobian)
         if not fastest * scale > 0 or not count:
             return np.zeros(count)
         step = STEP * scale / fastest
@@ -160,14 +177,8 @@ class FullSystem:
         self._mbs.systemData.SetODE2Coordinates(displacement)
         self._mbs.systemData.SetODE2Coordinates_t(velocity)
 
-    def _residual(self) -> np.ndarray:
-        self._solver.ComputeAlgebraicEquations(self._mbs, False)
-        return np.array(self._solver.GetSystemResidual())[self._solver.GetODE2size() :]
-
     def _jacobian(self) -> np.ndarray:
         return constraint_jacobian(self._mbs, self._solver)
 
     def _mass(self) -> np.ndarray:
-        count = self._solver.GetODE2size()
-        self._solver.ComputeMassMatrix(self._mbs)
-        return np.array(self._solver.GetSystemMassMatrix())[:count, :count]
+        return mass_matrix(self._mbs, self._solver)

@@ -22,7 +22,7 @@ from exudyn.advancedUtilities import NumericalJacobian
 from multiphi_exudyn.exudyn_plugin.convert.items.directions import Directions
 from multiphi_exudyn.exudyn_plugin.convert.items.items import is_nonlinear_constraint
 
-__all__ = ["constraint_jacobian", "generalised_forces", "geometric_stiffness", "static_solver"]
+__all__ = ["constraint_jacobian", "generalised_forces", "geometric_stiffness", "mass_matrix", "static_solver"]
 
 ROUND_OFF = 1e-12  # of the largest force: a smaller constraint force is round-off
 STRAIGHT = ("MassPoint", "Mass1D", "ANCF", "Ground")  # bodies whose points move linearly with the coordinates
@@ -67,11 +67,17 @@ def _may_turn(mbs: Any, load: Mapping[str, Any]) -> bool:
 
 
 def _of_constraints(mbs: Any, solver: Any) -> np.ndarray:
+    mass = mass_matrix(mbs, solver)
+    multipliers = _multipliers(mass, constraint_jacobian(mbs, solver), generalised_forces(mbs, solver))
+    coordinates = range(len(mass))
+    return np.asarray(NumericalJacobian(mbs, lambda: multipliers @ constraint_jacobian(mbs, solver), coordinates))
+
+
+def mass_matrix(mbs: Any, solver: Any) -> np.ndarray:
+    """M (n_full, n_full) at the current state."""
     count = solver.GetODE2size()
     solver.ComputeMassMatrix(mbs)
-    mass = np.array(solver.GetSystemMassMatrix())[:count, :count]
-    multipliers = _multipliers(mass, constraint_jacobian(mbs, solver), generalised_forces(mbs, solver))
-    return np.asarray(NumericalJacobian(mbs, lambda: multipliers @ constraint_jacobian(mbs, solver), range(count)))
+    return np.array(solver.GetSystemMassMatrix())[:count, :count]
 
 
 def constraint_jacobian(mbs: Any, solver: Any) -> np.ndarray:

@@ -17,13 +17,22 @@ import scipy.linalg
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mathematics.eigenproblems.modes import Modes, complete_modes
 
-__all__ = ["ASYMMETRY", "CheckedMatrices", "NotLinearStructure", "checked_matrices", "coordinate_name"]
+__all__ = [
+    "ASYMMETRY",
+    "DIFFERENTIATED",
+    "CheckedMatrices",
+    "NotLinearStructure",
+    "check_mass",
+    "checked_matrices",
+    "coordinate_name",
+]
 
 ASYMMETRY = 1e-6  # of the largest entry: error of the numerical differentiation of connectors
 DIFFERENTIATED = (
     1e-9  # of the largest damping or the fastest mode's critical one: error of the differentiation of forces
 )
 UNDAMPED = 1e-14  # of the same: smaller damping of a zero-frequency mode is round-off, whatever its coupling
+PIVOT = 1e-8  # of the largest pivot of a Cholesky decomposition: below it the eigenvalues decide
 MASSLESS = 1e-14  # of the largest eigenvalue of M: round-off of the projection of a coordinate without mass
 
 
@@ -54,13 +63,9 @@ def checked_matrices(
     damping.
     """
     asymmetries: list[str] = []
-    values, vectors = scipy.linalg.eigh(mass)
-    if values[0] <= MASSLESS * values[-1]:
-        where = _largest_coordinate_name(mbs, basis @ vectors[:, 0])
-        raise MultiPhiValueError(
-            f"mass: got {_kind(values[0], values[-1])} mass at {where} ({values[0] / values[-1]:.1g} of the largest), "
-            f"need more than {MASSLESS:g} of the largest, or a constraint that holds this coordinate"
-        )
+    for name, matrix in (("mass", mass), ("stiffness", stiffness), ("damping", damping)):
+        check_finite(mbs, name, matrix, basis)
+    _check_positive(mbs, mass, basis)
     mass = _symmetric(mbs, "mass", mass, basis, ASYMMETRY, asymmetries)
     stiffness = _symmetric(mbs, "stiffness", stiffness, basis, allowed, asymmetries)
     try:
@@ -74,6 +79,39 @@ def checked_matrices(
         ) from error
     damping = _symmetric(mbs, "damping", damping, basis, allowed, asymmetries, _critical(damping, modes))
     return CheckedMatrices(mass, stiffness, _damping(damping, mass, modes), tuple(asymmetries))
+
+
+def check_mass(mbs: Any, mass: np.ndarray, basis: np.ndarray) -> None:
+    """Raise MultiPhiValueError for a mass M (n_full, n_full) that is not positive definite in the directions S."""
+    projected = basis.T @ mass @ basis
+    try:
+        pivots = np.diagonal(np.linalg.cholesky(projected)) ** 2
+    except np.linalg.LinAlgError:
+        pivots = np.zeros(len(projected))
+    if np.min(pivots, initial=np.inf) <= PIVOT * np.max(pivots, initial=0.0):
+        _check_positive(mbs, projected, basis)
+
+
+def _check_positive(mbs: Any, mass: np.ndarray, basis: np.ndarray) -> None:
+    values, vectors = scipy.linalg.eigh(mass)
+    if values[0] <= MASSLESS * values[-1]:
+        where = _largest_coordinate_name(mbs, basis @ vectors[:, 0])
+        share = values[0] / values[-1] if values[-1] > 0 else 0.0
+        raise MultiPhiValueError(
+            f"mass: got {_kind(values[0], values[-1])} mass at {where} ({share:.1g} of the largest), "
+            f"need more than {MASSLESS:g} of the largest, or a constraint that holds this coordinate"
+        )
+
+
+def check_finite(mbs: Any, name: str, matrix: np.ndarray, basis: np.ndarray) -> None:
+    """Raise MultiPhiValueError for a matrix (n, n) in the coordinates of S with an entry that is not finite."""
+    bad = np.flatnonzero(~np.all(np.isfinite(matrix), axis=1))
+    if len(bad):
+        where = _largest_coordinate_name(mbs, basis[:, bad[0]])
+        raise MultiPhiValueError(
+            f"{name}: got an entry that is not a finite number, first at {where}, need finite forces and a finite "
+            "tangent in this state"
+        )
 
 
 def _kind(lowest: float, largest: float) -> str:

@@ -19,7 +19,7 @@ from multiphi_exudyn.exudyn_plugin.convert.items.items import user_function, val
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.geometric_stiffness import generalised_forces, static_solver
 from multiphi_exudyn.mechanics.loads.loads import FunctionLoad
 
-__all__ = ["TimedLoad", "function_loads", "timed_forces", "timed_loads"]
+__all__ = ["SAMPLE_TIMES", "SystemPlaceholder", "TimedLoad", "function_loads", "timed_forces", "timed_loads"]
 
 SAMPLE_TIMES = np.concatenate(
     [[0.0], np.geomspace(1e-6, 1e3, 64)]
@@ -40,14 +40,14 @@ def timed_loads(mbs: Any, loads: Sequence[Mapping[str, Any]], start: float) -> d
 
     The user functions have to be switched off.
     """
-    placeholder = _SystemPlaceholder(dict(mbs.variables))
+    placeholder = SystemPlaceholder(dict(mbs.variables))
     values = {i: _value(load, start, placeholder) for i, load in enumerate(loads) if user_function(load)}
     return {i: value if isinstance(value, str) else TimedLoad(_rows(mbs, i), value) for i, value in values.items()}
 
 
 def timed_forces(mbs: Any, objects: Sequence[Mapping[str, Any]], start: float) -> dict[int, TimedLoad]:
     """Changes with time of the forces of ObjectGenericODE2, by index; t = 0 is the time ``start`` [s]."""
-    placeholder = _SystemPlaceholder(dict(mbs.variables))
+    placeholder = SystemPlaceholder(dict(mbs.variables))
     forces = {
         i: _force_change(mbs, i, item["forceUserFunction"]["function"], start, placeholder)
         for i, item in enumerate(objects)
@@ -57,7 +57,7 @@ def timed_forces(mbs: Any, objects: Sequence[Mapping[str, Any]], start: float) -
 
 
 def _force_change(
-    mbs: Any, index: int, function: Any, start: float, placeholder: _SystemPlaceholder
+    mbs: Any, index: int, function: Any, start: float, placeholder: SystemPlaceholder
 ) -> TimedLoad | None:
     """Components that change with time; None without any, for too many, and for a function that reads the system."""
     indices = mbs.systemData.GetObjectLTGODE2(exu.ObjectIndex(index))
@@ -90,7 +90,7 @@ def _component(value: Callable[[float], np.ndarray], k: int) -> Callable[[Any], 
 
 
 def _value(
-    load: Mapping[str, Any], start: float, placeholder: _SystemPlaceholder
+    load: Mapping[str, Any], start: float, placeholder: SystemPlaceholder
 ) -> Callable[[float], np.ndarray] | str:
     """u(t), or the reason why it is not a function of time alone."""
     present, user = load[value_key(load)], load[user_function(load)]
@@ -108,8 +108,8 @@ def _value(
     return value
 
 
-class _SystemPlaceholder:
-    """Argument of a load's user function in place of the system, which does not exist in the model's run.
+class SystemPlaceholder:
+    """Argument of a user function in place of the system, which does not exist in the model's run.
 
     variables: those of the system at the reduction.
     """

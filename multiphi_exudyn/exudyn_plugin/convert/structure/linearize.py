@@ -20,7 +20,9 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.convert.contacts.point_rows import coordinate_row, default_points, requested_points
+from multiphi_exudyn.exudyn_plugin.convert.items.items import has_own_coordinates
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.full_system import initial_is_current
+from multiphi_exudyn.exudyn_plugin.convert.linearisation.start_state import violated_constraints
 from multiphi_exudyn.exudyn_plugin.convert.structure.linearized_structure import LinearizedStructure
 from multiphi_exudyn.exudyn_plugin.convert.structure.system_matrices import forces, projected_matrices
 from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
@@ -46,7 +48,7 @@ def linear_structure_from(
     q are the system's ODE2 coordinates, q_0 the current ones, S a basis of the directions that constraints leave free.
     The state must be an equilibrium of all forces but those of contacts and constraints, as a linear structure has no
     constant force (``reduce`` accepts any state). User functions and other nonlinear forces enter by their tangent at
-    q_0.
+    q_0; motions that constraints prescribe are held at q_0.
 
     Parameters
     ----------
@@ -73,8 +75,8 @@ def linear_structure_from(
     MultiPhiTypeError
         For points of another kind.
     MultiPhiValueError
-        For a system that is not assembled or not of second order, a state that is not an equilibrium, and a contact or
-        a matrix that a linear structure cannot have.
+        For a system that is not assembled, not of second order or with joints that slide along cables, a state that is
+        not an equilibrium or violates constraints, and a contact or a matrix that a linear structure cannot have.
 
     Examples
     --------
@@ -109,6 +111,12 @@ def linear_structure_from(
     check_system(mbs)
     objects = _contact_objects(mbs)
     with initial_is_current(mbs):
+        violated = violated_constraints(mbs)
+        if violated:
+            raise MultiPhiValueError(
+                f"mbs: its state violates constraints ({', '.join(violated)}), need a state that meets them: solve the "
+                "static problem first"
+            )
         gaps = [_gap(mbs, index) for index in objects]
         with _without_contacts(mbs, objects):
             matrices, basis = projected_matrices(mbs)
@@ -133,16 +141,25 @@ def check_system(mbs: Any) -> None:
             "finite element program to mp.LinearStructure)"
         )
     if len(mbs.systemData.GetODE1Coordinates()) > 0:
-        items = (mbs.GetObject(exu.ObjectIndex(i)) for i in range(mbs.systemData.NumberOfObjects()))
         first = ", ".join(
-            f"Object{item['objectType']} {item['name']!r}" for item in items if _has_first_order(mbs, item)
+            f"Object{item['objectType']} {item['name']!r}" for item in _objects(mbs) if _has_first_order(mbs, item)
         )
         raise MultiPhiValueError(f"mbs: got ODE1 coordinates ({first}), need a system of second order only")
+    sliding = [f"Object{item['objectType']} {item['name']!r}" for item in _objects(mbs) if has_own_coordinates(item)]
+    if sliding:
+        raise MultiPhiValueError(
+            f"mbs: got joints that slide along cables by a coordinate of their own ({', '.join(sliding)}), need joints "
+            "at fixed places, or activeConnector=False"
+        )
     if mbs.NumberOfGeneralContacts() > 0:
         raise MultiPhiValueError(
             "mbs: got a GeneralContact, whose pairs change, need contacts as items: ObjectContactCoordinate or "
             "ObjectContactSphereSphere"
         )
+
+
+def _objects(mbs: Any) -> Iterator[Mapping[str, Any]]:
+    return (mbs.GetObject(exu.ObjectIndex(i)) for i in range(mbs.systemData.NumberOfObjects()))
 
 
 def _has_first_order(mbs: Any, item: Mapping[str, Any]) -> bool:

@@ -24,13 +24,15 @@ from multiphi_exudyn.exudyn_plugin.convert.linearisation.geometric_stiffness imp
     geometric_stiffness,
     static_solver,
 )
-from multiphi_exudyn.exudyn_plugin.convert.linearisation.linearisation import Linearisation, UnmovedDirections
+from multiphi_exudyn.exudyn_plugin.convert.linearisation.linearisation import Linearisation, MovedBy, UnmovedDirections
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.matrix_checks import (
     ASYMMETRY,
+    DIFFERENTIATED,
     CheckedMatrices,
     NotLinearStructure,
     checked_matrices,
 )
+from multiphi_exudyn.exudyn_plugin.convert.linearisation.prescribed_motion import PrescribedMotion
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 
 __all__ = ["forces", "linearised", "projected_matrices"]
@@ -48,7 +50,7 @@ def _tangent_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
     """M, K, C (n, n), and S (n_full, n).
 
     Entries of K that are round-off of the geometric stiffness, or of a force over the system's size, are set to zero:
-    they would be a frequency, or an instability.
+    they would be a frequency, or an instability. So are entries of C that are round-off of sqrt(k m).
     """
     springs, geometric = _springs_with_factors(mbs), geometric_stiffness(mbs)
     with _without_stiffness(mbs, springs):
@@ -63,26 +65,60 @@ def _tangent_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
     stiffness += basis.T @ geometric @ basis
     stiffness = drop_round_off(stiffness, np.abs(basis).T @ sizes @ np.abs(basis))
     for item in springs.values():
-        first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) for m in item["markerNumbers"])
-        row = (item["factor1"] * second - item["factor0"] * first) @ basis
+        row = _row(mbs, item) @ basis
         stiffness += item["stiffness"] * np.outer(row, row)
         damping += item["damping"] * np.outer(row, row)
-    return mass, stiffness, damping, basis
+    critical = math.sqrt(float(np.max(np.abs(stiffness)) * np.max(np.abs(mass))))
+    return mass, stiffness, drop_round_off(damping, np.float64(critical)), basis
+
+
+def _row(mbs: Any, spring: Mapping[str, Any]) -> np.ndarray:
+    first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) for m in spring["markerNumbers"])
+    return np.asarray(spring["factor1"] * second - spring["factor0"] * first)
+
+
+def _by_motions(mbs: Any, motions: Mapping[int, PrescribedMotion]) -> dict[int, tuple[np.ndarray, ...]]:
+    """M e^T, K e^T and C e^T (n_full, k) of prescribed motions, by index; round-off is set to zero."""
+    if not motions:
+        return {}
+    springs, geometric = _springs_with_factors(mbs), geometric_stiffness(mbs)
+    with _without_stiffness(mbs, springs):
+        mass, stiffness, damping = map(np.array, mbs.ComputeLinearizedSystem()[:3])
+    stiffness += geometric
+    for item in springs.values():
+        row = _row(mbs, item)
+        stiffness += item["stiffness"] * np.outer(row, row)
+        damping += item["damping"] * np.outer(row, row)
+    return {i: tuple(_product(a, m.directions.T) for a in (mass, stiffness, damping)) for i, m in motions.items()}
+
+
+def _moved_by(
+    motion: PrescribedMotion, basis: np.ndarray, momenta: np.ndarray, stiffness: np.ndarray, damping: np.ndarray
+) -> MovedBy:
+    """Its forces S^T K e^T and S^T C e^T; damping that is an error of differentiation beside the stiffness is zero."""
+    stiffness, damping = _product(basis.T, stiffness), _product(basis.T, damping)
+    negligible = DIFFERENTIATED * motion.scale * np.max(np.abs(stiffness), axis=0)
+    return MovedBy(motion, momenta, stiffness, np.where(np.abs(damping) <= negligible, 0.0, damping))
+
+
+def _product(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    return drop_round_off(matrix @ columns, np.abs(matrix) @ np.abs(columns))
 
 
 def _matrices_of_moved_directions(
-    mbs: Any, forces_on_system: np.ndarray
+    mbs: Any, velocity: np.ndarray, forces_on_system: np.ndarray
 ) -> tuple[CheckedMatrices, np.ndarray, UnmovedDirections | None]:
     """M, K, C in z, S, and the directions that are left out.
 
-    forces_on_system (k, n_full): all forces that may act. If the matrices are not those of a linear structure because
+    velocity (n_full,): at the start, without that of prescribed motions. forces_on_system (k, n_full): all forces that
+    may act. If the matrices are not those of a linear structure because
     of directions in which none of these forces moves the system, these directions are left out.
     """
     mass, stiffness, damping, basis = _tangent_matrices(mbs)
     try:
         return checked_matrices(mbs, mass, stiffness, damping, basis, SYMMETRISED), basis, None
     except NotLinearStructure as fault:
-        momentum = mass @ (basis.T @ mbs.systemData.GetODE2Coordinates_t(exu.ConfigurationType.Initial))
+        momentum = mass @ (basis.T @ velocity)
         directions = moved_directions(mass, stiffness, damping, np.vstack([momentum, forces_on_system @ basis]))
         if directions is None:
             raise
@@ -94,19 +130,40 @@ def _matrices_of_moved_directions(
     return checked_matrices(mbs, mass, stiffness, damping, basis, SYMMETRISED), basis, unmoved
 
 
-def linearised(mbs: Any, time: float, rows: Sequence[np.ndarray]) -> Linearisation:
+def linearised(
+    mbs: Any, time: float, rows: Sequence[np.ndarray], motions: Mapping[int, PrescribedMotion]
+) -> Linearisation:
     """Linearisation about the initial state, at a time [s], without contacts and loads by functions of time.
 
-    rows: rows (n_full,) of these contacts and loads.
+    rows: rows (n_full,) of these contacts and loads. motions: by constraints.
     """
     data, initial = mbs.systemData, exu.ConfigurationType.Initial
     displacement, velocity = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
-    checked, basis, unmoved = _matrices_of_moved_directions(mbs, np.vstack([forces(mbs, time), *rows]))
+    by_motions = _by_motions(mbs, motions)
+    pulls = [column for _, *pair in by_motions.values() for pull in pair for column in pull.T]
+    moved_velocity = sum((m.derivative(0.0, 1) @ m.directions for m in motions.values()), np.zeros(len(velocity)))
+    present = forces(mbs, time)
+    checked, basis, unmoved = _matrices_of_moved_directions(
+        mbs, velocity - moved_velocity, np.vstack([present, *rows, *pulls])
+    )
     mass, stiffness, damping = checked.mass, checked.stiffness, checked.damping
-    static = basis.T @ forces(mbs, time) + damping @ (basis.T @ velocity)
+    moved = {i: _moved_by(motions[i], basis, *matrices) for i, matrices in by_motions.items()}
+    static = basis.T @ present + damping @ (basis.T @ (velocity - moved_velocity))
+    static += sum((each.damping @ each.motion.derivative(0.0, 1) for each in moved.values()), np.zeros(len(static)))
     largest = _largest_coordinate(mbs)
     return Linearisation(
-        mass, damping, stiffness, static, basis, displacement, velocity, time, largest, checked.asymmetries, unmoved
+        mass,
+        damping,
+        stiffness,
+        static,
+        basis,
+        displacement,
+        velocity,
+        time,
+        largest,
+        checked.asymmetries,
+        unmoved,
+        moved=moved,
     )
 
 

@@ -1,0 +1,172 @@
+"""Held places of friction springs where a mode of zero frequency feels their force: it has no static response to them.
+
+A block slides freely on a rough elastic floor, and a friction spring guides its height: the spring's force is part of
+the pressure, and so of the friction. Or a force law's falling branch cancels a friction spring, so that its body floats
+in the difference of two constant forces.
+"""
+
+import numpy as np
+import pytest
+from helpers.laws_at_instants import instants, residual, violations_of_friction
+from numpy.testing import assert_allclose
+
+import multiphi_exudyn as mp
+
+EXACT = 1e-11  # of the largest force, and of displacements about 1
+ROUND_OFF = 1e-11  # of energies about 1
+WEIGHT = 9.81
+LAW = np.array([-0.5, -0.1, 0.0, 0.1, 0.5]), np.array([-4.0, 1.0, 0.0, -1.0, 4.0])  # -10 N/m in the middle
+
+
+def assert_lawful(run, loads):
+    assert run.status == "ok", run.message
+    times = instants(run)
+    assert residual(run, times, loads) < EXACT
+    assert violations_of_friction(run, times) == []
+    assert run.ledger.friction >= 0
+    assert abs(run.ledger.residual) < ROUND_OFF * max(1.0, run.ledger.initial)
+
+
+def sliding_block(damping=None, mu=0.3, guided="y", static=1.0, bodies=1, stiffness=1e3, damper=0.0, surface=0.0):
+    """A free block, or two joined ones, on a rough floor, guided by a friction spring."""
+    n = 2 * bodies
+    springs = np.zeros((n, n))
+    if bodies == 2:
+        springs[::2, ::2] = springs[1::2, 1::2] = 50.0 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    names = ["x", "y", "x2", "y2"][:n]
+    structure = mp.LinearStructure(np.eye(n), springs, damping, {name: i for i, name in enumerate(names)})
+    floor = mp.UnilateralContact(
+        "floor", "y", 0.0, stiffness, damper, mu, "x", static_friction=static * mu, tangential_velocity=surface
+    )
+    return mp.MultiPhiModel(structure, [floor, mp.Friction("guide", guided, 20.0, stiffness=100.0)])
+
+
+def slide(model, t_end=1.0, loads=(), **start):
+    n = model.structure.n
+    loads = [mp.ConstantLoad(at, -WEIGHT) for at in ["y", "y2"][: n // 2]] + list(loads)
+    x, v = np.zeros(n), np.zeros(n)
+    x[1::2], v[0::2] = 0.05, 2.0
+    start = start or {"displacement": x, "velocity": v}
+    return mp.simulate(model, t_end, loads=loads, **start), loads
+
+
+def test_the_friction_of_a_guided_block_is_that_of_its_pressure():
+    """From the first to the last contact m x'' = -mu N, N with the guide's force; x by the impulses of N."""
+    run, loads = slide(sliding_block())
+    first, last = run.contact_intervals("floor")[0]
+    speed = run.velocity(np.array([first, last]))[0]
+    assert speed[1] - speed[0] == pytest.approx(-0.3 * run.contact_impulse("floor", first, last), rel=1e-12)
+    assert_lawful(run, loads)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        sliding_block(mu=0.1),
+        sliding_block(static=1.5),
+        sliding_block(guided={"y": 1.0, "x": 0.25}),
+        sliding_block(np.diag([0.5, 0.0])),  # damped sliding
+        sliding_block(np.diag([1e-3, 0.0])),  # so slowly that it is given by powers of time
+        sliding_block(np.array([[0.3, 0.1], [0.1, 0.3]])),
+        sliding_block(damper=5.0),
+        sliding_block(surface=-1.0),
+        sliding_block(bodies=2),
+        sliding_block(0.1 * np.eye(4), bodies=2),
+        sliding_block(stiffness=np.inf),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize(
+    "loads", [(), (mp.ConstantLoad("x", 1.0), mp.SampledLoad("y", [0, 0.3, 0.6, 9], [0, 5, 0, 0]))]
+)
+def test_sliding_beside_a_friction_spring_keeps_the_equation_of_motion(model, loads):
+    run, loads = slide(model, loads=loads)
+    assert_lawful(run, loads)
+
+
+def test_a_small_stiffness_along_the_floor_hardly_changes_the_motion():
+    model = sliding_block()
+    free, loads = slide(model)
+    held = mp.LinearStructure(np.eye(2), np.diag([1e-3, 0.0]), None, {"x": 0, "y": 1})
+    with pytest.warns(mp.MultiPhiWarning, match="slow model"):
+        run = mp.simulate(
+            mp.MultiPhiModel(held, model.contacts), 1.0, displacement=[0.0, 0.05], velocity=[2.0, 0.0], loads=loads
+        )
+    assert_allclose(run.at("x", 1.0), free.at("x", 1.0), rtol=0, atol=1e-3)
+
+
+def floating(spring=10.0, velocity=0.0, damping=None, base=0.0, bodies=1):
+    """A mass in the middle of the law, with a friction spring whose stiffness cancels its slope."""
+    springs = 50.0 * np.array([[1.0, -1.0], [-1.0, 1.0]])[:bodies, :bodies] * (bodies > 1)
+    springs[0, 0] += base
+    structure = mp.LinearStructure(np.eye(bodies), springs, damping, {"x": 0, "z": bodies - 1})
+    belt = mp.Friction("belt", "x", 2.0, stiffness=spring, velocity=velocity)
+    return mp.MultiPhiModel(structure, [mp.ForceLaw("x", LAW, name="law"), belt])
+
+
+@pytest.mark.parametrize("velocity", [0.0, -1.0, 0.5])
+@pytest.mark.parametrize(
+    "given",
+    [
+        {},
+        {"damping": np.array([[0.5]])},
+        {"spring": 4.0, "base": 6.0},  # both together cancel the slope
+        {"spring": 5.0, "base": 10.0},  # while it slips, the slope cancels the structure's own stiffness
+        {"bodies": 2},
+        {"bodies": 2, "damping": 0.2 * np.eye(2)},
+    ],
+    ids=str,
+)
+def test_a_slope_that_cancels_a_friction_spring(given, velocity):
+    loads = [mp.SampledLoad("x", [0.0, 1.0, 2.0, 9.0], [0.0, -10.0, 0.0, 0.0]), mp.ConstantLoad("z", 0.2)]
+    run = mp.simulate(floating(velocity=velocity, **given), 4.0, loads=loads)
+    assert_lawful(run, loads)
+
+
+def test_floating_between_two_constant_forces():
+    """With the spring's place held at w0 the force on the mass is k w0, whatever its displacement: m x'' = k w0."""
+    run = mp.simulate(floating(), 6.0, velocity=[0.8])  # the law turns it back outside the middle, where it slips
+    times = instants(run, 8)
+    place, force = run.at("x", times), run.friction_force("belt", times)
+    held = 10.0 * place - force  # k w
+    free = (np.abs(place) < 0.1) & (np.abs(force) < 1.99)
+    assert_allclose(run.acceleration(times)[0][free], held[free], rtol=0, atol=EXACT)
+    assert np.abs(held[free]).max() > 0.1  # else nothing is tested
+
+
+@pytest.mark.parametrize(
+    "rest", [1e-14, 1e-13, 1e-12, -1e-12, 1e-11, 1e-10, -1e-9, 1e-8, 9e-8, 2e-7, -2e-7, 1e-6, 1e-4]
+)
+@pytest.mark.parametrize("velocity", [0.0, -1.0, 0.5])
+@pytest.mark.parametrize("bodies", [1, 2])
+def test_a_slope_that_nearly_cancels_a_friction_spring(rest, velocity, bodies):
+    """The motion depends on the rest of the stiffness as smoothly as the forces do."""
+    loads = [mp.SampledLoad("x", [0.0, 1.0, 2.0, 9.0], [0.0, -10.0, 0.0, 0.0])]
+    zero, run = (
+        mp.simulate(floating(10.0 * (1 + part), velocity, bodies=bodies), 4.0, loads=loads) for part in (0.0, rest)
+    )
+    assert run.status == "ok", run.message
+    times = np.linspace(0.0, 4.0, 41)
+    expected = zero.at("x", times)
+    assert_allclose(run.at("x", times), expected, rtol=0, atol=(4 * abs(rest) + 1e-7) * np.abs(expected).max())
+    if abs(rest) < 1e-7:
+        assert abs(run.ledger.residual) < 1e-9
+
+
+def test_a_soft_spring_that_cancels_nothing_keeps_its_frequency():
+    """It is as small beside the stiff ones as the rest of springs that cancel."""
+    structure = mp.LinearStructure(np.eye(2), np.diag([1.0, 1e10]), None, {"soft": 0, "stiff": 1})
+    law = mp.ForceLaw("stiff", (np.array([-1.0, -0.5, 0.5, 1.0]), np.array([-1.0, 5e8, -5e8, 1.0])), name="law")
+    run = mp.simulate(mp.MultiPhiModel(structure, [law]), 3.0, displacement=[1.0, 0.0])
+    assert_allclose(run.at("soft", 3.0), np.cos(3.0), rtol=0, atol=1e-9)
+
+
+def test_many_runs_and_continued_ones_are_the_same_motion():
+    model, times = sliding_block(), np.linspace(0.0, 1.0, 21)
+    whole, loads = slide(model)
+    x, v = np.array([[0.0, 0.05]]), np.array([[2.0, 0.0]])
+    many = mp.simulate_many(model, 1.0, x, v, loads=loads, points=["x"], times=times)
+    assert_allclose(many.samples[0, 0], whole.at("x", times), rtol=0, atol=EXACT)
+    first = mp.simulate(model, 0.15, displacement=x[0], velocity=v[0], loads=loads)
+    rest = mp.simulate(model, 1.0, start=first, loads=loads)
+    assert_allclose(rest.at("x", 1.0), whole.at("x", 1.0), rtol=0, atol=1e-10)

@@ -1,0 +1,130 @@
+"""A friction spring beside a rigid stop with restitution: from the second bounce on it is at its limit at every impact.
+
+The spring has slipped on the way to the first bounce, and sticks after it with the force F: its body comes back to the
+stop with the same force. Whether it slips then is decided with the velocity after the impact, which unloads it.
+"""
+
+import numpy as np
+import pytest
+from helpers.laws_at_instants import instants, residual, violations_of_friction
+from numpy.testing import assert_allclose
+
+import multiphi_exudyn as mp
+
+EXACT = 1e-11  # of displacements, speeds and forces about 1
+ROUND_OFF = 1e-12  # of energies about 1
+
+
+def springs(*limits, stiffness=10.0, at="y"):
+    return [mp.Friction(f"spring{i}", at, limit, stiffness=stiffness) for i, limit in enumerate(limits)]
+
+
+def falling(restitution=0.5, friction=None, mass=1.0, up=1.0, gap=0.0, kind=np.inf, more=()):
+    """A mass above (up = 1) or below (-1) a stop, with friction springs in its way."""
+    structure = mp.LinearStructure(np.eye(1) * mass, np.zeros((1, 1)), points={"y": 0})
+    stop = mp.UnilateralContact("stop", {"y": up}, gap, kind, restitution=restitution if np.isinf(kind) else 0.0)
+    return mp.MultiPhiModel(structure, [stop, *(friction or springs(1.0)), *more])
+
+
+def bounces(run, contact="stop"):
+    """Instants of the impacts on a contact."""
+    return [event.time for event in run.events if event.contact == contact and event.kind == "close"]
+
+
+def assert_lawful(run, loads=()):
+    assert run.status == "ok", run.message
+    times = instants(run)
+    assert residual(run, times, loads) < EXACT
+    assert violations_of_friction(run, times) == []
+    assert run.ledger.friction >= 0
+    assert abs(run.ledger.residual) < ROUND_OFF * max(1.0, run.ledger.initial)
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("m", "k", "limit", "e", "g"), [(1, 10, 1, 0.5, 3), (0.5, 200, 2, 0.9, 10), (4, 3, 0.25, 1, 1)]
+)
+def test_after_its_second_bounce_the_spring_unloads(m, k, limit, e, g, up):
+    load = mp.ConstantLoad("y", -m * g * up)
+    run = mp.simulate(falling(e, springs(limit, stiffness=k), m, up), 8.0, displacement=np.array([up]), loads=[load])
+    _, second, *rest = bounces(run)
+    after = np.linspace(0.0, 0.9 * min([1.0, *(third - second for third in rest[:1])]), 12)
+    omega, centre = np.sqrt(k / m), (limit - m * g) / k  # m x'' = -m g - (k x - F) from the stop
+    speed = up * run.velocity(second, "right")[0]
+    assert speed > 0
+    x = centre * (1 - np.cos(omega * after)) + speed / omega * np.sin(omega * after)
+    sticks = np.cumprod(k * x - limit < limit).astype(bool)
+    found = up * run.at("y", second + after), up * run.friction_force("spring0", second + after)
+    assert_allclose(found[0][sticks], x[sticks], rtol=0, atol=EXACT)
+    assert_allclose(found[1][sticks], (k * x - limit)[sticks], rtol=0, atol=EXACT * max(1, limit))
+    assert_lawful(run, [load])
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("limits", [(1.0, 1.0), (0.5, 2.0, 1.0)])
+@pytest.mark.parametrize("gravity", [0.0, 3.0])
+def test_several_springs_at_one_stop(limits, restitution, gravity):
+    """Each of them is at its own limit where the stop is."""
+    loads = [mp.ConstantLoad("y", -gravity)]
+    model = falling(restitution, springs(*limits), gap=0.2, more=[mp.UnilateralContact("above", {"y": -1.0}, 0.7)])
+    assert_lawful(mp.simulate(model, 3.0, displacement=[0.5], velocity=[-4.0], loads=loads), loads)
+
+
+@pytest.mark.parametrize("more", ["spring stop", "rigid friction", "static limit", "belt"])
+def test_beside_other_elements(more):
+    friction, further = springs(1.0), []
+    if more == "spring stop":
+        further = [mp.UnilateralContact("soft", "y", 0.2, 100.0)]
+    elif more == "rigid friction":
+        further = [mp.Friction("block", "y", 0.4)]
+    elif more == "static limit":
+        friction = [mp.Friction("spring0", "y", 1.0, static_limit=1.5, stiffness=10.0)]
+    else:
+        friction = [mp.Friction("spring0", "y", 1.0, stiffness=10.0, velocity=-0.5)]
+    loads = [mp.ConstantLoad("y", -3.0)]
+    assert_lawful(
+        mp.simulate(falling(0.5, friction, gap=0.2, more=further), 3.0, displacement=[1.0], loads=loads), loads
+    )
+
+
+def test_a_spring_that_the_impact_does_not_unload_slips():
+    """The impact is on another body: the spring reaches its limit at that instant and slips on."""
+    structure = mp.LinearStructure(np.eye(2), np.zeros((2, 2)), points={"y": 0, "z": 1})
+    stop, spring = (
+        mp.UnilateralContact("stop", "y", 0.0, restitution=0.5),
+        mp.Friction("spring", "z", 1.0, stiffness=2.0),
+    )
+    quarter = np.pi / 2 / np.sqrt(2.0)  # z = a sin(omega t), at its limit k z = -F at an eighth of its period
+    start, velocity = [0.5 * quarter, 0.0], [-1.0, -1.0]
+    run = mp.simulate(mp.MultiPhiModel(structure, [stop, spring]), 1.0, displacement=start, velocity=velocity)
+    assert run.status == "ok", run.message
+    (impact,) = bounces(run)
+    slips = next(event.time for event in run.events if event.contact == "spring")
+    assert slips == pytest.approx(impact, rel=1e-12)
+    assert run.friction_force("spring", impact + 0.1) == pytest.approx(-1.0, rel=1e-13)
+    assert_lawful(run)
+
+
+def test_two_bodies_on_two_stops_meet_the_same_law():
+    structure = mp.LinearStructure(np.eye(2), 50.0 * np.array([[1.0, -1.0], [-1.0, 1.0]]), points={"y": 0, "z": 1})
+    stops = [mp.UnilateralContact(f"stop {at}", at, 0.2, restitution=0.5) for at in "yz"]
+    friction = [mp.Friction(f"spring {at}", at, 1.0, stiffness=20.0) for at in "yz"]
+    loads = [mp.ConstantLoad("y", -3.0), mp.ConstantLoad("z", -3.0)]
+    run = mp.simulate(mp.MultiPhiModel(structure, [*stops, *friction]), 3.0, displacement=[1.0, 1.0], loads=loads)
+    assert_allclose(run.at("y", instants(run)), run.at("z", instants(run)), rtol=0, atol=EXACT)
+    assert_lawful(run, loads)
+
+
+def test_continued_at_the_second_bounce_and_in_a_batch_it_is_the_same_motion():
+    model, loads = falling(), [mp.ConstantLoad("y", -3.0)]
+    whole = mp.simulate(model, 3.0, displacement=[1.0], loads=loads)
+    second = bounces(whole)[1]
+    for end in (second, np.nextafter(second, 0.0), np.nextafter(second, 9.0)):
+        first = mp.simulate(model, end, displacement=[1.0], loads=loads)
+        rest = mp.simulate(model, 3.0, start=first, loads=loads)
+        assert_lawful(rest, loads)
+        times = np.linspace(second + 0.01, 3.0, 20)
+        assert_allclose(rest.at("y", times), whole.at("y", times), rtol=0, atol=1e-10)
+    times = np.linspace(0.0, 3.0, 61)
+    many = mp.simulate_many(model, 3.0, np.array([[0.7], [1.0]]), loads=loads, points=["y"], times=times)
+    assert_allclose(many.samples[1, 0], whole.at("y", times), rtol=0, atol=EXACT)
