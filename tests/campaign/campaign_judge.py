@@ -8,6 +8,7 @@ zero; no nudge excuses a status.
 from dataclasses import dataclass, replace
 
 import brute_force
+import campaign_bodies
 import numpy as np
 from campaign_scenes import later, scaled
 from campaign_scenes.parts import NEAR
@@ -75,6 +76,9 @@ def instants(scene):
 
 def judged(scene):
     """([(kind, cause), ...], digest) of a scene."""
+    if scene.in_exudyn:
+        found = campaign_bodies.JUDGES[scene.in_exudyn](scene)
+        return found, [found[0][0], 0, []]
     try:
         motion = native(scene)
     except mp.MultiPhiError as refusal:

@@ -47,6 +47,8 @@ LIGHT = dict.fromkeys(KINDS, 3) | {
     "at events": 3,
     "dampers": 3,
     "digits": 3,
+    "body statics": 0,
+    "body unmatched": 0,
 }  # quick ones in which something happens; random_campaign.py runs many
 
 

@@ -211,12 +211,12 @@ class _Run:
 
     @cached_property
     def length(self) -> float:
-        """Largest sqrt(M_ii) |x_i| at the instants, and what no motion is [m sqrt(kg)]."""
+        """Largest sqrt(M_ii) |x_i| at the instants and way of a counter-surface, and what no motion is [m sqrt(kg)]."""
         largest = float(np.max(np.abs(self.root * self.x_sides[1]), initial=0.0))
-        return (
-            largest
-            + (NO_MOTION * float(np.max(np.abs(self.root * self.v_sides[1]))) + self.idle) * self.trajectory.t_end
-        )
+        belts = [friction.velocity for friction in self.frictions] + [c.tangential_velocity for c in self.rough]
+        carried = float(np.max(np.abs(belts), initial=0.0)) * float(np.max(self.root))
+        velocity = NO_MOTION * float(np.max(np.abs(self.root * self.v_sides[1]), initial=0.0)) + self.idle
+        return largest + (carried + velocity) * self.trajectory.t_end
 
     @cached_property
     def speed(self) -> float:

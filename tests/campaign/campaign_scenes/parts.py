@@ -22,7 +22,7 @@ class Scene:
     shown, frame: x of the run and of brute force are compared as shown x_run and frame x_brute_force.
     split: instants at which a run is ended and begun again. units: powers of two of time, length and mass. by_laws:
     whether the answer need not be unique, and is judged by the law check alone. near: how far the run and brute force
-    may be apart, of the largest value.
+    may be apart, of the largest value. in_exudyn: how a body is to be judged (campaign_bodies.py); steps: of it.
     """
 
     kind: str
@@ -40,6 +40,8 @@ class Scene:
     units: tuple[int, int, int] = (0, 0, 0)
     by_laws: bool = False
     near: float = NEAR
+    in_exudyn: str = ""
+    steps: int = 0
 
 
 @dataclass
