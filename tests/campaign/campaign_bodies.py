@@ -1,17 +1,24 @@
-"""What is to be said of a body in Exudyn in a static solution, or with steps that its modes are not matched to."""
+"""What is to be said of a body in Exudyn in a static solution, with steps that its modes are not matched to, and of a
+reduced system with a joint that its start violates.
+"""
 
 import warnings
 
+import brute_force
 import exudyn as exu
+import exudyn.itemInterface as eii
 import numpy as np
+from campaign_scenes.parts import NEAR
 from exudyn.itemInterface import LoadCoordinate, MarkerNodeCoordinate
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody
+from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, reduce
 from reference_models.body_alone import solve_body_alone
 from reference_models.solver_settings import fixed_steps
 
 STATIC = 1e-6  # of the largest displacement
+TIMES = 40  # at which a reduced motion is compared
+KEPT = []  # the container of the system that is being reduced: without it Exudyn frees the system
 COARSE = 0.05  # of the norm of the motion: more has to be told
 
 
@@ -63,4 +70,41 @@ def unmatched(scene):
     return [("failure: unmatched", f"off by {off:.3g} of the motion in {scene.steps} steps, without a warning")]
 
 
-JUDGES = {"static": static, "unmatched": unmatched}
+def jointed(scene):
+    """The reduced system of masses with a joint against brute force in the motions that the joint leaves."""
+    joint = scene.joint
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of Exudyn's own conversions
+        reduction = reduce(_joined(joint))
+    run = mp.simulate(reduction.model, scene.t_end, velocity=reduction.velocity, loads=reduction.loads)
+    times = np.linspace(0.0, scene.t_end, TIMES)
+    answer = brute_force.solved(scene.system, scene.displacement, scene.velocity, times)
+    expected, found = joint.tied @ answer.displacement, reduction.structure.coordinates @ run.displacement(times)
+    off = float(np.max(np.abs(found - expected)) / np.max(np.abs(expected)))
+    return [("ok", "")] if off <= NEAR else [("failure: joint", f"off by {off:.3g} of the largest displacement")]
+
+
+def _joined(joint):
+    """An Exudyn system of masses of one coordinate each, with the joint and the stop."""
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    nodes = [
+        mbs.AddNode(eii.Node1D(referenceCoordinates=[0.0], initialCoordinates=[0.0], initialVelocities=[v]))
+        for v in joint.velocity.tolist()
+    ]
+    matrices = {"massMatrix": joint.mass, "stiffnessMatrix": joint.stiffness, "dampingMatrix": 0 * joint.mass}
+    mbs.AddObject(eii.ObjectGenericODE2(nodeNumbers=nodes, **matrices))
+    markers = [mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=node, coordinate=0)) for node in nodes]
+    ends = [markers[joint.one], markers[joint.other]]
+    mbs.AddObject(eii.ObjectConnectorCoordinate(markerNumbers=ends, factorValue1=1 / joint.ratio))
+    at, gap, stiffness = joint.stop
+    ground = mbs.AddMarker(MarkerNodeCoordinate(nodeNumber=mbs.AddNode(eii.NodePointGround()), coordinate=0))
+    data = mbs.AddNode(eii.NodeGenericData(initialCoordinates=[0.0], numberOfDataCoordinates=1))
+    stop = {"markerNumbers": [ground, markers[at]], "nodeNumber": data, "contactStiffness": stiffness, "offset": -gap}
+    mbs.AddObject(eii.ObjectContactCoordinate(**stop))
+    mbs.Assemble()
+    KEPT[:] = [container]
+    return mbs
+
+
+JUDGES = {"static": static, "unmatched": unmatched, "jointed": jointed}

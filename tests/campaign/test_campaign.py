@@ -49,6 +49,7 @@ LIGHT = dict.fromkeys(KINDS, 3) | {
     "digits": 3,
     "body statics": 0,
     "body unmatched": 0,
+    "joints": 0,
 }  # quick ones in which something happens; random_campaign.py runs many
 
 

@@ -1,11 +1,11 @@
-"""Scenes for a body in Exudyn: a static solution, and steps that its modes are not matched to."""
+"""Scenes for Exudyn: static solutions of a body, steps that its modes are not matched to, joints to be reduced."""
 
 from dataclasses import replace
 
 import numpy as np
 
 import multiphi_exudyn as mp
-from campaign_scenes.parts import add_contacts, random_parts, random_velocity
+from campaign_scenes.parts import Joint, Parts, add_contacts, random_parts, random_velocity
 
 SLOWEST_STEPS, FASTEST_STEPS = 0.5, 3.0  # powers of ten: steps in the shortest period of the open level
 
@@ -29,4 +29,28 @@ def _unmatched(random):
     return replace(scene, in_exudyn="unmatched", steps=steps)
 
 
-DRAWN = {"body statics": _statics, "body unmatched": _unmatched}
+def _jointed(random):
+    """Masses in a row, the motions of two of them tied, velocities that violate the joint, a stop at one of them.
+
+    x = T q in the motions that the joint leaves; the system for brute force is that of q. The start has the momentum
+    along T of the velocities that were given.
+    """
+    parts = random_parts(random, int(random.integers(2, 5)), structure="chain", damping="none")
+    n, velocity = parts.n, random_velocity(parts)
+    one, other = (int(k) for k in random.choice(n, 2, replace=False))
+    ratio = float(random.choice([1.0, -1.0, 0.5, 2.0]))
+    tied = np.delete(np.eye(n), other, axis=1)
+    tied[other] = ratio * tied[one]
+    at = int(random.integers(n))
+    stop = (at, float(random.uniform(0.02, 0.2)), float(10.0 ** random.uniform(2, 3)))
+    mass, stiffness = (tied.T @ matrix @ tied for matrix in (parts.mass, parts.stiffness))
+    own = Parts(random, mass, stiffness)
+    own.contact(tied[at], *stop[1:])
+    start = np.linalg.solve(mass, tied.T @ parts.mass @ velocity)
+    scene = own.scene(velocity=start)
+    return replace(
+        scene, in_exudyn="jointed", joint=Joint(parts.mass, parts.stiffness, velocity, tied, one, other, ratio, stop)
+    )
+
+
+DRAWN = {"body statics": _statics, "body unmatched": _unmatched, "joints": _jointed}
