@@ -609,8 +609,9 @@ def _energies(run: _Run, inside: _Inside | None) -> list[str]:
     happened = event_table(trajectory.events, trajectory.model.index)[:, 0]
     after = len(happened) and happened[-1] == end  # the last energy is that after the event
     if run.complete and trajectory.status == "ok" and not after and not trajectory.model.overrides:
-        own = _energy(run, trajectory, end)
-        found += _told("energy at the end", np.array([abs(own - ledger.final)]), ENERGY * scale, at, "energies")
+        own, either = _energy(run, trajectory, end)
+        off = np.array([abs(own - ledger.final)])
+        found += _told("energy at the end", off, ENERGY * scale + either, at, "energies")
     return found
 
 
@@ -635,17 +636,23 @@ def _energy_terms(run: _Run, x: np.ndarray, v: np.ndarray) -> float:
     return float(np.max(terms))
 
 
-def _energy(run: _Run, trajectory: Trajectory, t: float) -> float:
-    """Kinetic and strain energy [J] at an instant, from x, x' and forces of friction springs."""
+def _energy(run: _Run, trajectory: Trajectory, t: float) -> tuple[float, float]:
+    """Kinetic and strain energy [J] at an instant, from x, x' and forces of friction springs.
+
+    And the part of viscous contacts without a force, which may just be opening or open.
+    """
     x, v = np.asarray(trajectory.displacement(t)), np.asarray(trajectory.velocity(t))
-    energy = 0.5 * float(v @ (run.mass @ v)) + 0.5 * float(x @ (run.stiffness @ x))
+    either, energy = 0.0, 0.5 * float(v @ (run.mass @ v)) + 0.5 * float(x @ (run.stiffness @ x))
     for law in run.laws:
         energy += float(law.energy(run.rows[law.name] @ x))
     for contact in run.contacts:
         gap = float(run.rows[contact.name] @ x) + contact.gap - float(run.stop(contact, np.array([t]))[0][0])
-        if not contact.rigid and (contact.damping == 0 or float(trajectory.contact_force(contact.name, t)) > 0):
-            energy += 0.5 * contact.stiffness * min(0.0, gap) ** 2
+        stored = 0.0 if contact.rigid else 0.5 * contact.stiffness * min(0.0, gap) ** 2
+        if contact.damping and float(trajectory.contact_force(contact.name, t)) <= EXACT * contact.stiffness * abs(gap):
+            either += stored
+        else:
+            energy += stored
     springs = [(friction.name, friction.stiffness) for friction in run.frictions]
     for name, spring in (*springs, *((contact.name, contact.tangential_stiffness) for contact in run.rough)):
         energy += 0.5 * float(trajectory.friction_force(name, t)) ** 2 / spring
-    return energy
+    return energy, either
