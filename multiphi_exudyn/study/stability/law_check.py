@@ -599,7 +599,7 @@ def _energies(run: _Run, inside: _Inside | None) -> list[str]:
         scale,
         *(abs(getattr(ledger, n)) for n in ("initial", "work_of_loads", "impact", "damping", "friction", "final")),
     )
-    scale = max(scale, run.idle**2)
+    scale = max(scale, run.acceleration * run.length)  # the work of forces on what they hardly move
     found, at = [], np.array([end])
     found += _told("ledger is open", np.array([abs(ledger.residual)]), ENERGY * scale, at, "its rows")
     returned = {"damping": _stored_inside(run)}
