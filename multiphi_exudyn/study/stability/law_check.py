@@ -190,7 +190,9 @@ class _Run:
         happened = event_table(run.events, run.model.index)[:, 0]
         chosen = [np.unique(times) for times in (happened, self.bounds)]
         chosen = [t[np.linspace(0, len(t) - 1, min(EVENTS, len(t))).astype(int)] for t in chosen]
-        times = np.unique(np.concatenate([np.linspace(run.t_start, run.t_end, EVEN), *chosen]))
+        even = np.linspace(run.t_start, run.t_end, EVEN)
+        near = np.abs(even[:, None] - np.concatenate(chosen)) < SHORTEST * run.t_end  # an event by round-off after it
+        times = np.unique(np.concatenate([even[~np.any(near, axis=1)], *chosen]))
         return times[times < run.t_end]
 
     @cached_property
