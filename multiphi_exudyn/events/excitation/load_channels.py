@@ -30,8 +30,8 @@ __all__ = ["LoadChannels", "columns", "load_label", "static_load"]
 class LoadChannels:
     """The channels of loads, added one load after the other."""
 
-    def __init__(self, model: MultiPhiModel, end: float, finer: float) -> None:
-        self._model, self._end, self._finer = model, end, finer
+    def __init__(self, model: MultiPhiModel, end: float, finer: float, lasting: float) -> None:
+        self._model, self._end, self._finer, self._lasting = model, end, finer, lasting
         self.patterns: list[np.ndarray] = []
         self.stops: list[np.ndarray] = []
         self.histories: list[PiecewiseExponential] = []
@@ -75,7 +75,7 @@ class LoadChannels:
         round-off / (d t)^2 or / (omega t)^2 for small damping d or frequencies; the response to a channel does not.
         """
         base, self.static = self._model.base, load
-        rigid, slow = base.modes.rigid, is_slow(base.modes.omega, self._end)
+        rigid, slow = base.modes.rigid, is_slow(base.modes.omega, self._lasting)
         slow[:rigid] = np.any(base.damping[:rigid])
         if np.any(slow) and (np.any(load[slow]) or self._model.held):
             self.steady = len(self.histories)

@@ -171,9 +171,7 @@ def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.nda
     spring_compliance = 1 / np.where(sprung, closed_directions.stiffness, 1.0)
     motions, restoring = _large_motions(base, closed_directions, firm)
     deflections = (compliance * elastic_vectors.T).T
-    solve = _solver(
-        elastic_vectors.T @ deflections, spring_compliance, sprung, vectors[:firm].T @ motions, restoring
-    )
+    solve = _solver(elastic_vectors.T @ deflections, spring_compliance, sprung, vectors[:firm].T @ motions, restoring)
     forces, large_motion = solve(-offsets - sprung * (elastic_load @ deflections), -(load[:firm] @ motions))
     total = drop_round_off(
         elastic_load + elastic_vectors @ forces, np.abs(elastic_load) + np.abs(elastic_vectors) @ np.abs(forces)

@@ -115,8 +115,8 @@ class ModelWarnings:
 
     rigid: whether there is a rigid contact. spread: names of those whose effective mass the mesh decides. needs_motion:
     whether friction, a force law that is approximated or at an end of its span, or the model's own check, needs the
-    motion of every run. before, clusters: warnings. fastest: highest frequency of the open level [Hz]. ample: a duration
-    [s] in which all modes move.
+    motion of every run. before, clusters: warnings. fastest: highest frequency of the open level [Hz]. ample: a
+    duration [s] in which all modes move.
     """
 
     rigid: bool
@@ -241,9 +241,9 @@ def _slow_mode(trajectory: Trajectory) -> Iterator[str]:
     if span > 0 and EPSILON * far > LOST * size:
         share = min(1.0, EPSILON * far / size) if size > 0 else 1.0
         yield (
-            f"slow mode: a mode of {slowest / (2 * math.pi):.3g} Hz has hardly begun in {span:g} s, and its equilibrium "
-            f"lies so far away that {per_cent(share)} of the displacement is round-off at every event; hold it, or make "
-            "its stiffness exactly zero"
+            f"slow mode: a mode of {slowest / (2 * math.pi):.3g} Hz has hardly begun in {span:g} s, and its "
+            f"equilibrium lies so far away that {per_cent(share)} of the displacement is round-off at every event; "
+            "hold it, or make its stiffness exactly zero"
         )
 
 
