@@ -6,14 +6,10 @@ stop with the same force. Whether it slips then is decided with the velocity aft
 
 import numpy as np
 import pytest
+from lawful import EXACT, assert_lawful
 from numpy.testing import assert_allclose
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.study.stability.law_check import broken_laws
-
-EXACT = 1e-11  # of displacements, speeds and forces about 1
-INTERVALS = 60  # within segments, where the laws are checked
-ROUND_OFF = 1e-12  # of energies about 1
 
 
 def springs(*limits, stiffness=10.0, at="y"):
@@ -30,13 +26,6 @@ def falling(restitution=0.5, friction=None, mass=1.0, up=1.0, gap=0.0, kind=np.i
 def bounces(run, contact="stop"):
     """Instants of the impacts on a contact."""
     return [event.time for event in run.events if event.contact == contact and event.kind == "close"]
-
-
-def assert_lawful(run, loads=()):
-    assert run.status == "ok", run.message
-    assert broken_laws(run, loads, intervals=INTERVALS, exact=EXACT) == []
-    assert run.ledger.friction >= 0
-    assert abs(run.ledger.residual) < ROUND_OFF * max(1.0, run.ledger.initial)
 
 
 @pytest.mark.parametrize("up", [1.0, -1.0])
