@@ -28,8 +28,8 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "slow mode: ..."          a mode whose period is so long that its motion under loads is lost in round-off
     "load pieces: ..."        loads of so many samples or pieces that the run takes long
     "coarse steps: ..."       steps of Exudyn that delay the motion of modes not matched to them
-    "turning: ..."            a body in Exudyn that turns beyond the linear range, or may do so unseen; a rigid
-    "rigid interface ...:"    interface of it that does
+    "turning: ..."            a body in Exudyn that turns beyond the linear range, or may do so unseen
+    "rigid interface ...: "   a rigid interface of a body that turns beyond the linear range
     "slow model: ..."         modes that hardly begin to move in the run: matrices swapped, or units mixed
 """
 
@@ -103,7 +103,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     if tolerance is not None or not (share >= 0 and error >= 0):
         share, error = verdict_of(trajectory, tolerance)
     if tolerance is None and not (share > 0 or error > 0):
-        return advised((*before, *after), tolerance)
+        return (*before, *after)
     struck = general.rigid and error > 0 and _struck(trajectory)
     return advised((*before, *truncation_warnings(model, (share, error), tolerance, struck), *after), tolerance)
 
