@@ -190,7 +190,9 @@ class _Run:
         happened = event_table(run.events, run.model.index)[:, 0]
         chosen = [np.unique(times) for times in (happened, self.bounds)]
         chosen = [t[np.linspace(0, len(t) - 1, min(EVENTS, len(t))).astype(int)] for t in chosen]
-        times = np.unique(np.concatenate([np.linspace(run.t_start, run.t_end, EVEN), *chosen]))
+        even = np.linspace(run.t_start, run.t_end, EVEN)
+        near = np.abs(even[:, None] - np.concatenate(chosen)) < SHORTEST * run.t_end  # an event by round-off after it
+        times = np.unique(np.concatenate([even[~np.any(near, axis=1)], *chosen]))
         return times[times < run.t_end]
 
     @cached_property
@@ -599,7 +601,7 @@ def _energies(run: _Run, inside: _Inside | None) -> list[str]:
         scale,
         *(abs(getattr(ledger, n)) for n in ("initial", "work_of_loads", "impact", "damping", "friction", "final")),
     )
-    scale = max(scale, run.idle**2)
+    scale = max(scale, run.acceleration * run.length)  # the work of forces on what they hardly move
     found, at = [], np.array([end])
     found += _told("ledger is open", np.array([abs(ledger.residual)]), ENERGY * scale, at, "its rows")
     returned = {"damping": _stored_inside(run)}
