@@ -133,6 +133,22 @@ class TestSoftBesideStiff:
         assert found[0] == 0
         assert found[1] > 1e6
 
+    @pytest.mark.parametrize("seed", range(6))
+    def test_free_directions_that_no_spring_touches_are_free(self, seed):
+        """Springs of exact numbers on some of the coordinates, which a coupled mass moves with the others."""
+        rng = np.random.default_rng(seed)
+        for n in (2, 3, 5):
+            springs = int(rng.integers(1, n))
+            factor, scale = rng.integers(-2, 3, (springs, springs)), 10.0 ** rng.integers(-12, 13)
+            mass, stiffness = np.eye(n) + 0.1 * np.ones((n, n)), np.zeros((n, n))
+            stiffness[:springs, :springs] = factor @ factor.T + np.eye(springs)
+            coordinates = rng.permutation(n)
+            mass, stiffness = (
+                m[np.ix_(coordinates, coordinates)] for m in (mass + np.diag(rng.uniform(size=n)), stiffness)
+            )
+            found = mp.MultiPhiModel(mp.LinearStructure(mass, scale * stiffness)).level(()).frequencies
+            assert np.count_nonzero(found == 0) == n - springs
+
     def test_a_negative_spring_beside_stiff_ones_is_refused(self, refused):
         stiff = 2.0**46
         structure = mp.LinearStructure(np.eye(2), [[stiff - 8.0, -stiff], [-stiff, stiff]])
