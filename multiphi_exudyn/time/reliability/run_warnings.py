@@ -28,6 +28,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "slow mode: ..."          a mode whose period is so long that its motion under loads is lost in round-off
     "load pieces: ..."        loads of so many samples or pieces that the run takes long
     "coarse steps: ..."       steps of Exudyn that delay the motion of modes not matched to them
+    "truncated statics: ..."  what the modes leave out of a static solution of Exudyn under forces on a body's interface
     "turning: ..."            a body in Exudyn that turns beyond the linear range, or may do so unseen; a rigid
     "rigid interface ...:"    interface of it that does
     "slow model: ..."         modes that hardly begin to move in the run: matrices swapped, or units mixed
