@@ -185,7 +185,7 @@ class Interface:
     def record_static_error(self, stepped: SteppedLevel) -> None:
         """Keep what the modes leave out of the static response to the forces on the points, f of SolveStatic.
 
-            d = R_0 (y(f) - Psi S^-1 R^T f),   l_i^2 = R_0i Omega^-2 R_0i^T,   error = max(|d_i| / l_i) / max(|y_i| / l_i)
+            d = R_0 (y(f) - Psi S^-1 R^T f),   error = max |d_i / l_i| / max |y_i / l_i|,   l_i^2 = R_0i Omega^-2 R_0i^T
 
         R_0 (m, b) are rows of the points in base coordinates, y(f) (b,) the response of the level without truncation.
         """
