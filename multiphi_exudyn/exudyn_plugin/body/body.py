@@ -312,6 +312,7 @@ class MultiPhiBody:
             interface.record_angles()
             interface.record_static_error(stepped)
         self._record.include_level(level.level)
+        self._record.include_places(level, xi, time)
         self._keep_end()
         return static_changes(self.name, level, xi[:, 0], reactions)
 
