@@ -142,16 +142,35 @@ class StepwiseRun:
         return is_clear
 
     def _record_laws(self, t: float) -> None:
-        """Record the places of force laws at t [s] if one is in a last segment."""
-        if self._is_at_end:
-            coordinates = self._body.coordinates
-            stepped, times = coordinates.stepped, np.array([t])
-            q = coordinates.views[0][: stepped.modes, None]
-            level, xi, _ = self._loads.level_coordinates(stepped, q, 0 * q, coordinates.held[:, None], times)
-            self._record.include_places(level, xi, times)
+        """Record the places of force laws at t [s] if one in a last segment may be beyond its span."""
+        if not self._is_at_end:
+            return
+        coordinates = self._body.coordinates
+        stepped, times = coordinates.stepped, np.array([t])
+        q = coordinates.views[0][: stepped.modes]
+        if not self._loads.varies and np.abs(self._span_rows.dot(q) + self._span_offsets).max() <= 1.0:
+            return
+        level, xi, _ = self._loads.level_coordinates(
+            stepped, q[:, None], 0 * q[:, None], self.state.held[:, None], times
+        )
+        self._record.include_places(level, xi, times)
+
+    def _prepare_spans(self) -> None:
+        """Prepare the places of force laws in a last segment, -1 to 1 inside their spans, for constant loads."""
+        laws = laws_at_an_end(self._body.model, [self.state.states])
+        self._is_at_end = bool(laws)
+        if not laws or self._loads.varies:
+            return
+        level, r = self._loads.loaded_levels.level(self.state.states), self._body.coordinates.stepped.modes
+        indices = [self._body.model.index(law.name) for law in laws]
+        ends = np.array([[law.knots[0], law.knots[-1]] for law in laws])
+        middles, halves = np.mean(ends, axis=1), np.diff(ends, axis=1)[:, 0] / 2
+        rows, centres = level.level.gap_rows[indices], np.array([law.centre for law in laws])
+        places = centres + level.gap_constants[indices] + rows[:, r:] @ self.state.held
+        self._span_rows, self._span_offsets = rows[:, :r] / halves[:, None], (places - middles) / halves
 
     def _choose_test(self) -> None:
-        self._is_at_end = bool(laws_at_an_end(self._body.model, [self.state.states]))
+        self._prepare_spans()
         self._test = self._tests.get_or_build(self.state.states, self._new_test)
 
     def _new_test(self) -> StepTest:
