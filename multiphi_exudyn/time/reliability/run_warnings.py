@@ -28,6 +28,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "slow mode: ..."          a mode whose period is so long that its motion under loads is lost in round-off
     "load pieces: ..."        loads of so many samples or pieces that the run takes long
     "coarse steps: ..."       steps of Exudyn that delay the motion of modes not matched to them
+    "truncated statics: ..."  what the modes leave out of a static solution of Exudyn under forces on a body's interface
     "turning: ..."            a body in Exudyn that turns beyond the linear range, or may do so unseen
     "rigid interface ...: "   a rigid interface of a body that turns beyond the linear range
     "slow model: ..."         modes that hardly begin to move in the run: matrices swapped, or units mixed
@@ -52,7 +53,7 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.time.loop.verdict import lost_share
 from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
 from multiphi_exudyn.time.reliability.impact_warnings import impact_warnings, is_taking, mesh_warnings, spread_contacts
-from multiphi_exudyn.time.reliability.law_span import laws_at_an_end, span_warnings
+from multiphi_exudyn.time.reliability.law_span import LawPlaces, laws_at_an_end, span_warnings
 from multiphi_exudyn.time.reliability.law_warnings import approximated_laws, law_warnings
 from multiphi_exudyn.time.reliability.ledger_warnings import ledger_warnings
 from multiphi_exudyn.time.reliability.truncation_warnings import energy_warning, truncation_warnings, verdict_of
@@ -189,12 +190,13 @@ class RunSummary:
     """Summary of a run of a body in Exudyn, which keeps no segments.
 
     levels: visited levels, each once. truncated: energy [J] lost to truncation at the start and at all events.
-    energy: largest sampled kinetic and strain energy of the run [J].
+    energy: largest sampled kinetic and strain energy of the run [J]. places: of force laws beyond their spans.
     """
 
     levels: Sequence[Level]
     truncated: float
     energy: float
+    places: LawPlaces
 
 
 def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
@@ -203,6 +205,7 @@ def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
     if not model.whole:
         sentences.extend(static_warnings(run.levels))
         sentences.extend(energy_warning(lost_share(abs(run.truncated), run.energy)))
+    sentences.extend(run.places.warnings)
     return tuple(sentences)
 
 
