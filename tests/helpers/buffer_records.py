@@ -135,8 +135,8 @@ class Search:
     def _sign(self, s, sizes, since):
         constant = float(self.buffers.numbers[self.constants + s])
         return self._run(zero_crossing.first_sign)(
-            *self.buffers.all, self.basis, self.signals + s * self.p, constant, sizes, since, self.scratch,
-            self.scratch_wave,
+            *self.buffers.all, self.basis, self.signals + s * self.p, constant, abs(constant), sizes, since,
+            self.scratch, self.scratch_wave,
         )  # fmt: skip
 
 

@@ -25,7 +25,7 @@ from multiphi_exudyn import (
     UnilateralContact,
     simulate,
 )
-from multiphi_exudyn.mechanics.loads.time_functions import Harmonic
+from multiphi_exudyn.mechanics.loads.time_functions import Harmonic, Smooth
 
 
 @settings(derandomize=True, max_examples=15, deadline=None)
@@ -176,3 +176,39 @@ def test_goes_on_in_the_middle_of_a_sweep_that_has_to_be_refined():
     t = np.linspace(4.3, 10.0, 101)
     assert len(rest.events) > 5
     assert_allclose(rest.at("m", t), whole.at("m", t), rtol=0, atol=1e-7 * np.max(np.abs(whole.at("m", t))))
+
+
+def moved_stop(course, size=1.0):
+    """A light mass beside a rigid stop that moves by a course; its stiffness holds it where the stop strikes it."""
+    structure = LinearStructure(np.eye(1), 40.0 * np.eye(1), np.eye(1), {"x": 0})
+    model = MultiPhiModel(structure, [UnilateralContact("stop", "x", 0.3 * size)])
+    return model, [StopMotion("stop", course)]
+
+
+@pytest.mark.parametrize("size", [2.0**-30, 1.0, 3e5])
+@pytest.mark.parametrize("kind", ["smooth", "rough", "harmonic"])
+def test_beside_a_moving_rigid_stop_a_run_goes_on_from_any_instant(kind, size):
+    """Also where the stop is at zero: its motion is as accurate as its travel, not as its place."""
+    way = {
+        "smooth": Smooth(lambda t: 0.1 * size * np.sin(3.3 * t) * np.cos(4.7 * t)),
+        "rough": Smooth(lambda t: 0.1 * size * np.sin(3.3 * t) * np.cos(4.7 * t), tolerance=1e-4),
+        "harmonic": Harmonic(0.1 * size, 3.3 / (2 * math.pi), -math.pi / 2),
+    }[kind]
+    model, loads = moved_stop(way, size)
+    zeros, whole = [math.pi / 3.3 * i for i in (1, 2, 4, 5)], simulate(model, 6.5, velocity=[-size], loads=loads)
+    for cut in [*np.random.default_rng(1).uniform(0.5, 6.0, 4), *zeros]:
+        first = simulate(model, float(cut), velocity=[-size], loads=loads)
+        both = simulate(model, 6.5, start=first, loads=loads)
+        assert both.status == "ok"
+        accurate = 1e-2 if kind == "rough" else 1e-5
+        assert both.at("x", 6.5) == pytest.approx(whole.at("x", 6.5), abs=accurate * size)
+
+
+@pytest.mark.parametrize("size", [2.0**-30, 1.0])
+def test_a_stop_that_jumps_where_a_run_goes_on_is_refused(size):
+    model, loads = moved_stop(Harmonic(0.1 * size, 0.5, -math.pi / 2), size)
+    first = simulate(model, 2.0, velocity=np.array([-size]), loads=loads)
+    for step in (1e-6, -1e-6, 0.02):
+        _, others = moved_stop(Smooth(lambda t, way=step: size * (0.1 * np.sin(math.pi * t) + way)), size)
+        with pytest.raises(MultiPhiValueError, match="stop of the rigid contact 'stop' jumps by"):
+            simulate(model, 3.0, start=first, loads=others)

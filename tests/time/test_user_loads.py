@@ -157,3 +157,24 @@ class TestManyPieces:
         assert [sentence.split(":")[0] for sentence in run.warnings] == ["load pieces"]
         few = mp.SampledLoad("m0", load.time[:50], load.force[:50])
         assert mp.simulate(model, 1.0, loads=[few]).warnings == ()
+
+
+@pytest.mark.parametrize("push", [5.0, -5.0, 100.0, 0.0])
+@pytest.mark.parametrize("load", [
+    mp.SweepLoad("x", 0.1, 0.5, 2.0, 5.0),
+    mp.FunctionLoad("x", lambda t: 0.1 * np.sin(t) ** 3),
+    mp.FunctionLoad("x", lambda t: 0.1 * np.sin(t) ** 3, tolerance=1e-6),
+])  # fmt: skip
+def test_a_force_law_that_pushes_at_rest_moves_as_a_spring_and_a_load(push, load):
+    """Its energy is counted from the end of its table nearest to rest, and is below zero at equilibrium."""
+    law = mp.ForceLaw("x", (np.array([-20.0, 20.0]), push + 10 * np.array([-20.0, 20.0])), name="preload")
+    one_sided = mp.ForceLaw("x", (np.array([0.0, 1.0]), push + np.array([0.0, 10.0])), name="preload")
+    sprung = mp.LinearStructure([[1.0]], [[20.0]], [[0.5]], {"x": 0})
+    t, start = np.linspace(0, 5, 41), [-push / 20]
+    expected = mp.simulate(mp.MultiPhiModel(sprung), 5.0, displacement=start, loads=[load, mp.ConstantLoad("x", -push)])
+    for given in (law, one_sided):
+        model = mp.MultiPhiModel(mp.LinearStructure([[1.0]], [[10.0]], [[0.5]], {"x": 0}), [given])
+        run = mp.simulate(model, 5.0, displacement=start, loads=[load])
+        assert (run.status, run.message) == ("ok", "")
+        assert np.max(np.abs(run.at("x", t) - expected.at("x", t))) < 1e-6 * max(abs(push), 0.1)
+        assert abs(run.ledger.residual) < 1e-9 * max(push**2, 1.0)

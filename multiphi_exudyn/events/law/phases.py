@@ -50,11 +50,11 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.events.states.flow import expand
 from multiphi_exudyn.events.states.signal_flow import signal_sizes, signal_waves
-from multiphi_exudyn.events.states.signals import held_part, mapped_size, rate_sign, row_sign
+from multiphi_exudyn.events.states.signals import held_part, held_size, mapped_size, rate_sign, row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.round_off import FOLLOWING, ZERO
 from multiphi_exudyn.mathematics.search.zero_crossing import first_sign
-from multiphi_exudyn.mechanics.elements.element import ALWAYS_TAKEN, MAY_RECOVER, TAKEN_ONCE
+from multiphi_exudyn.mechanics.elements.element import ALWAYS_TAKEN, MAY_RECOVER, NEVER_RECOVERS, TAKEN_ONCE
 
 __all__ = [
     "arm_return_exits",
@@ -77,8 +77,8 @@ def phase_of(ints: Ints, numbers: Numbers, waves: Waves, state: int, exit_: int)
 
     A friction spring that is beyond its limit by no more than it moves in the round-off of an instant may rise, too.
     """
-    signal, mapped = exit_ + SIGNAL, 0.0
-    if ints[exit_ + FIRMNESS] == ALWAYS_TAKEN:  # a reaction; gaps and velocities are the same in both levels
+    signal, mapped, firmness = exit_ + SIGNAL, 0.0, ints[exit_ + FIRMNESS]
+    if firmness in (ALWAYS_TAKEN, NEVER_RECOVERS):  # a reaction, or what may not be negative by round-off
         mapped = mapped_size(ints, numbers, state, signal, 0)
     value = row_sign(ints, numbers, state, signal, mapped)
     if value > 0:
@@ -88,7 +88,7 @@ def phase_of(ints: Ints, numbers: Numbers, waves: Waves, state: int, exit_: int)
         rate = becomes(ints, numbers, waves, state, signal, 2)
     if value == 0 and rate >= 0:
         return ARMED
-    recovers = ints[exit_ + FIRMNESS] == MAY_RECOVER or ints[exit_ + FIRMNESS] >= TAKEN_ONCE
+    recovers = firmness == MAY_RECOVER or firmness >= TAKEN_ONCE
     if rate > 0 and not recovers and numbers[ints[SPRINGS] + ints[exit_ + ELEMENT]] > 0.0:
         recovers = (
             row_sign(ints, numbers, state, signal, FOLLOWING / ZERO * swept_size(ints, numbers, state, signal)) == 0
@@ -113,10 +113,10 @@ def becomes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal: int,
     expand(ints, numbers, waves, state)
     signal_waves(ints, numbers, waves, state, signal, ints[WORK_WAVES])
     signal_sizes(ints, numbers, waves, state, signal, ints[SEARCH_NUMBERS])
-    constant = numbers[ints[signal + ROW] + 2 * n] + held_part(ints, numbers, state, signal)
-    basis = ints[FLOW_BASIS]
+    own, held = numbers[ints[signal + ROW] + 2 * n], held_part(ints, numbers, state, signal)
+    size = abs(own) + held_size(ints, numbers, state, signal)
     return first_sign(
-        ints, numbers, waves, basis, ints[WORK_WAVES], constant, ints[SEARCH_NUMBERS], since,
+        ints, numbers, waves, ints[FLOW_BASIS], ints[WORK_WAVES], own + held, size, ints[SEARCH_NUMBERS], since,
         ints[SEARCH_NUMBERS] + ints[FLOW_COUNT], ints[SEARCH_WAVES],
     )  # fmt: skip
 

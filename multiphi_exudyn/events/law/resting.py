@@ -260,13 +260,14 @@ def reaction_sign(ints: Ints, numbers: Numbers, places: int, speeds: int, level:
         size += terms * abs(numbers[ints[places + PLACE] + j])
     width = ints[ints[speeds + LEVEL] + MODES] + ints[CHANNELS]
     for j in range(width):
-        damped, reached = 0.0, 0.0
+        factor, terms, reached = 0.0, 0.0, 0.0
         for i in range(n):
-            damped += numbers[row + n + i] * numbers[ints[v_map + RATE_MATRIX] + i * width + j]
+            term = numbers[row + n + i] * numbers[ints[v_map + RATE_MATRIX] + i * width + j]
+            factor += term
+            terms += abs(term)
             reached += abs(numbers[row + i] * numbers[ints[v_map + MATRIX] + i * width + j])
-        damped *= numbers[ints[speeds + SPEED] + j]
-        value += damped
-        size += abs(damped) + reached * numbers[ints[speeds + REACH] + j]
+        value += factor * numbers[ints[speeds + SPEED] + j]
+        size += terms * abs(numbers[ints[speeds + SPEED] + j]) + reached * numbers[ints[speeds + REACH] + j]
     return sign_of(value, size)
 
 

@@ -33,7 +33,7 @@ from multiphi_exudyn.events.law.impact import collide
 from multiphi_exudyn.events.law.phases import becomes, entered_signal, first_exit, is_denied, update_phases
 from multiphi_exudyn.events.law.redundancy import drop_redundant_stick
 from multiphi_exudyn.events.law.resting import same_speed
-from multiphi_exudyn.events.states.signals import row_sign
+from multiphi_exudyn.events.states.signals import mapped_size, row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mechanics.elements.element import ALWAYS_TAKEN
 
@@ -126,7 +126,7 @@ def would_pull_if_closed(ints: Ints, numbers: Numbers, waves: Waves, state: int,
     signal = entered_signal(ints, level, exit_)
     if signal < 0:
         return signal
-    sign = row_sign(ints, numbers, state, signal, 0.0)
+    sign = row_sign(ints, numbers, state, signal, mapped_size(ints, numbers, state, signal, 0))
     if sign == 0:
         sign = becomes(ints, numbers, waves, state, signal, 0)
     return 1 if sign <= 0 else 0

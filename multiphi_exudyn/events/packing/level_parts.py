@@ -23,7 +23,7 @@ def level_numbers(level: LoadedLevel) -> np.ndarray:
     parts: tuple[ArrayLike, ...] = (
         [form.constant, level.excitation.highest_frequency, response.basis.unit],
         modal.squares,
-        modal.damping.diagonal() / 2,
+        modal.damping_matrix.diagonal() / 2,
         level.asymptotic.drive,
         modal.coupling,
         channels.force,

@@ -33,9 +33,12 @@ from multiphi_exudyn.events.arrays import (
     PIECE_TERMS,
     PLACE,
     PRESCRIBED,
+    REACH,
     RESPONSE,
     SCALED_TERM,
+    SET_SIZES,
     SPEED,
+    SWING,
     TERM_INTS,
     TERMS_NOW,
     WORK_WAVES,
@@ -50,6 +53,7 @@ from multiphi_exudyn.mathematics.response.basis_arrays import (
     describe_basis,
     differentiate,
     exponentials,
+    magnitude,
 )
 from multiphi_exudyn.mathematics.response.forced_arrays import forced_response
 from multiphi_exudyn.mathematics.response.response_arrays import (
@@ -59,7 +63,7 @@ from multiphi_exudyn.mathematics.response.response_arrays import (
     coefficients_of,
 )
 
-__all__ = ["expand", "next_state", "state_at", "unit_of_flow"]
+__all__ = ["expand", "next_state", "scale_by_terms", "state_at", "unit_of_flow"]
 
 
 @compiled
@@ -243,3 +247,36 @@ def sum_flow(ints: Ints, numbers: Numbers, waves: Waves, level: int, x: int, v: 
         for i in range(first, end):
             numbers[x + i] += (waves[row + i] * value).real
             numbers[v + i] += (waves[row + i] * slope).real
+
+
+@compiled
+def scale_by_terms(ints: Ints, numbers: Numbers, waves: Waves, state: int) -> None:
+    """Raise the scales of a state to the sizes of the terms of which the last ``state_at`` has summed it.
+
+    They say more than |eta'| / omega and omega |eta| where a mode has no frequency, and where a forced response cancels
+    a free one.
+    """
+    level = ints[state + LEVEL]
+    r, basis, response = ints[level + MODES], ints[FLOW_BASIS], ints[level + RESPONSE]
+    n, free, count, c = r + ints[PRESCRIBED], ints[FLOW_FREE], ints[FLOW_COUNT], ints[FLOW_WAVES]
+    phi, places, speeds = ints[WORK_WAVES], ints[SET_SIZES], ints[SET_SIZES] + r
+    for i in range(2 * r):
+        numbers[places + i] = 0.0
+    for j in range(count):
+        size = magnitude(waves, c + j)
+        value = size * magnitude(waves, phi + j)
+        slope = magnitude(waves, ints[basis + RATES] + j) * value
+        if ints[ints[basis + POWERS] + j] > 0:
+            power = ints[ints[basis + POWERS] + j] / numbers[ints[basis + SCALES]]
+            slope += power * size * magnitude(waves, phi + j - 1)
+        first, end, row = 0, r, ints[FLOW_FORCED] + (j - free) * n
+        if j < free:
+            first, end = ints[ints[response + REACHED] + 2 * j], ints[ints[response + REACHED] + 2 * j + 1]
+            row = ints[response + SHAPES] + j * r
+        for i in range(first, end):
+            shape = magnitude(waves, row + i)
+            numbers[places + i] += shape * value
+            numbers[speeds + i] += shape * slope
+    for i in range(r):
+        numbers[ints[state + REACH] + i] = max(numbers[ints[state + REACH] + i], numbers[places + i])
+        numbers[ints[state + SWING] + i] = max(numbers[ints[state + SWING] + i], numbers[speeds + i])

@@ -169,8 +169,9 @@ def size_by_terms(ints: Ints, numbers: Numbers, way: int, part: int, given: int,
 def move(ints: Ints, numbers: Numbers, places: int, speeds: int, level: int, result: int) -> int:
     """xi of the state ``places`` and xi' of ``speeds``, of the same instant, as a state of a level; OK or NEED.
 
-    The sizes of the map's terms are kept for the decisions of this instant: a mode that hardly moves has the round-off
-    of those from which it was mapped. If the map sets places, they are added to the scales of the following motion.
+    The sizes of the map's terms, with the scales of the state before, are kept for the decisions of this instant: a
+    mode that hardly moves has the round-off of those from which it was mapped. If the map sets places, its terms are
+    added to the scales of the following motion.
     """
     here, there = ints[places + LEVEL], ints[speeds + LEVEL]
     way = find_map(ints, here, level)
@@ -184,9 +185,7 @@ def move(ints: Ints, numbers: Numbers, places: int, speeds: int, level: int, res
         ints, numbers, way, other, ints[places + PLACE], ints[speeds + SPEED], ints[here + MODES] + channels,
         ints[there + MODES] + channels, rows, ints[result + PLACE], ints[result + SPEED], sizes,
     )  # fmt: skip
-    for i in range(
-        ints[level + MODES] + ints[PRESCRIBED], rows
-    ):  # a place taken over where it is zero but for round-off
+    for i in range(ints[level + MODES] + ints[PRESCRIBED], rows):  # a held place that is round-off of its map is zero
         if abs(numbers[ints[result + PLACE] + i]) <= ZERO * numbers[sizes + i]:
             numbers[ints[result + PLACE] + i] = 0.0
     ints[result + LEVEL] = level
@@ -198,4 +197,19 @@ def move(ints: Ints, numbers: Numbers, places: int, speeds: int, level: int, res
         if sets_places:
             numbers[ints[result + REACH] + i] += numbers[sizes + i]
             numbers[ints[result + SWING] + i] += numbers[sizes + rows + i]
+    map_scales(ints, numbers, places, ints[way + MATRIX], 0, result)
+    map_scales(ints, numbers, speeds, ints[other + RATE_MATRIX], 1, result)
     return 0
+
+
+@compiled
+def map_scales(ints: Ints, numbers: Numbers, state: int, matrix: int, rate: int, result: int) -> None:
+    """Add to the sizes of a map's terms those of the scales of the state before; rate: 1 for velocities, else 0."""
+    reach, mapped, sizes = ints[state + REACH], ints[state + MAPPED], ints[result + MAPPED]
+    if rate == 1:
+        reach, mapped, sizes = ints[state + SWING], ints[state + MAPPED_SPEED], ints[result + MAPPED_SPEED]
+    n = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS]
+    for i in range(ints[ints[result + LEVEL] + MODES]):
+        for j in range(n):
+            numbers[sizes + i] += abs(numbers[matrix + j]) * max(numbers[reach + j], numbers[mapped + j])
+        matrix += n

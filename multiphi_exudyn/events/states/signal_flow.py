@@ -40,6 +40,7 @@ from multiphi_exudyn.mathematics.response.response_arrays import (
     FROM_DISPLACEMENT,
     FROM_VELOCITY,
     REACHED,
+    SHAPES,
 )
 
 __all__ = ["signal_sizes", "signal_waves"]
@@ -74,27 +75,24 @@ def signal_waves(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal:
 def signal_sizes(ints: Ints, numbers: Numbers, waves: Waves, state: int, signal: int, result: int) -> None:
     """Compute the sizes (p,) of the terms of a signal's coefficients.
 
-    |row.V| |c| + |row'.V| |c| |lambda|, and of a power d > 0 its derivative d / T at the one before.
+    |row| |V| |c| + |row'| |V| |c| |lambda|, and of a power d > 0 its derivative d / T at the one before.
     """
     n, row, basis = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW], ints[FLOW_BASIS]
-    moving = n - ints[CHANNELS] + ints[PRESCRIBED]
+    r, response = n - ints[CHANNELS], ints[ints[state + LEVEL] + RESPONSE]
+    moving = r + ints[PRESCRIBED]
     free, count, unit = ints[FLOW_FREE], ints[FLOW_COUNT], numbers[ints[ints[FLOW_BASIS] + SCALES]]
     rated = ints[signal + RATED] == 1
     size_terms(ints, numbers, waves, state)
     for j in range(count):
+        first, end, shape = 0, moving, ints[FLOW_FORCED] + (j - free) * moving
+        if j < free:
+            first, end = ints[ints[response + REACHED] + 2 * j], ints[ints[response + REACHED] + 2 * j + 1]
+            shape = ints[response + SHAPES] + j * r
         value = 0.0
         slope = 0.0
-        if j < free:
-            value = abs(waves[ints[signal + WAVE] + j])
-            slope = abs(waves[ints[signal + WAVE] + free + j]) if rated else 0.0
-        else:
-            forced = ints[FLOW_FORCED] + (j - free) * moving
-            whole = 0j
-            changed = 0j
-            for i in range(moving):
-                whole += numbers[row + i] * waves[forced + i]
-                changed += numbers[row + n + i] * waves[forced + i]
-            value, slope = abs(whole), abs(changed)
+        for i in range(first, end):
+            value += abs(numbers[row + i]) * magnitude(waves, shape + i)
+            slope += abs(numbers[row + n + i]) * magnitude(waves, shape + i) if rated else 0.0
         terms = numbers[ints[FLOW_TERMS] + j]
         numbers[result + j] = value * terms
         if rated:

@@ -26,7 +26,7 @@ from multiphi_exudyn.events.states.state_arrays import accelerate, acceleration_
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.round_off import ZERO
 
-__all__ = ["gap", "held_part", "mapped_size", "rate_sign", "row_sign", "sign_of"]
+__all__ = ["gap", "held_part", "held_size", "mapped_size", "rate_sign", "row_sign", "sign_of"]
 
 
 @compiled
@@ -41,21 +41,22 @@ def sign_of(value: float, size: float) -> int:
 def row_sign(ints: Ints, numbers: Numbers, state: int, signal: int, terms: float) -> int:
     """9. Return the sign of a signal, zero if it is round-off of its terms.
 
-    At the root of a signal all displacements, or velocities, may be round-off of their earlier values: |eta'| / omega
-    and omega |eta| count too. terms: the size of further terms of the signal.
+    The parts of a mode's displacement and of its velocity may cancel, as at the root of a damper's force, so each
+    counts by itself. At the root of a signal all displacements, or velocities, may be round-off of their earlier
+    values: |eta'| / omega and omega |eta| count too. terms: the size of further terms of the signal.
     """
     n, row = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW]
     x, v, reach, swing = ints[state + PLACE], ints[state + SPEED], ints[state + REACH], ints[state + SWING]
     rated, value = ints[signal + RATED] == 1, numbers[row + 2 * n]
     size = abs(value) + terms
     for i in range(n):
-        term = numbers[row + i] * numbers[x + i]
-        size += abs(numbers[row + i]) * numbers[reach + i]
+        displaced = numbers[row + i] * numbers[x + i]
+        value += displaced
+        size += abs(displaced) + abs(numbers[row + i]) * numbers[reach + i]
         if rated:
-            term += numbers[row + n + i] * numbers[v + i]
-            size += abs(numbers[row + n + i]) * numbers[swing + i]
-        value += term
-        size += abs(term)
+            damped = numbers[row + n + i] * numbers[v + i]
+            value += damped
+            size += abs(damped) + abs(numbers[row + n + i]) * numbers[swing + i]
     return sign_of(value, size)
 
 
@@ -99,12 +100,12 @@ def rate_sign(ints: Ints, numbers: Numbers, state: int, signal: int) -> int:
         acceleration_sizes(ints, numbers, state, terms)
     value, size = 0.0, mapped_size(ints, numbers, state, signal, 1)
     for i in range(n):
-        term = numbers[row + i] * numbers[v + i]
-        size += abs(term) + abs(numbers[row + i]) * numbers[swing + i]
+        moved = numbers[row + i] * numbers[v + i]
+        value += moved
+        size += abs(moved) + abs(numbers[row + i]) * numbers[swing + i]
         if rated:
-            term += numbers[row + n + i] * numbers[accelerations + i]
+            value += numbers[row + n + i] * numbers[accelerations + i]
             size += abs(numbers[row + n + i]) * numbers[terms + i]
-        value += term
     return sign_of(value, size)
 
 
@@ -115,6 +116,16 @@ def held_part(ints: Ints, numbers: Numbers, state: int, signal: int) -> float:
     first, total = ints[ints[state + LEVEL] + MODES] + ints[PRESCRIBED], 0.0
     for k in range(first, first + held):
         total += numbers[ints[signal + ROW] + k] * numbers[ints[state + PLACE] + k]
+    return total
+
+
+@compiled
+def held_size(ints: Ints, numbers: Numbers, state: int, signal: int) -> float:
+    """Return the size of the terms of that part."""
+    held = ints[CHANNELS] - ints[PRESCRIBED]
+    first, total = ints[ints[state + LEVEL] + MODES] + ints[PRESCRIBED], 0.0
+    for k in range(first, first + held):
+        total += abs(numbers[ints[signal + ROW] + k] * numbers[ints[state + PLACE] + k])
     return total
 
 

@@ -31,7 +31,15 @@ from multiphi_exudyn.events.arrays import (
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled
 from multiphi_exudyn.mathematics.round_off import ZERO
 
-__all__ = ["accelerate", "acceleration_sizes", "clear_turning_speeds", "copy_state", "measure", "same_level"]
+__all__ = [
+    "accelerate",
+    "acceleration_sizes",
+    "clear_turning_speeds",
+    "copy_state",
+    "keep_scales",
+    "measure",
+    "same_level",
+]
 
 
 @compiled
@@ -68,6 +76,15 @@ def measure(ints: Ints, numbers: Numbers, state: int) -> None:
     for k in range(ints[CHANNELS]):
         numbers[reach + r + k] = numbers[sizes + k] if k < q else 0.0
         numbers[swing + r + k] = numbers[sizes + q + k] if k < q else 0.0
+
+
+@compiled
+def keep_scales(ints: Ints, numbers: Numbers, earlier: int, state: int) -> None:
+    """Give a state of the same level and instant the scales of an earlier one where they are larger."""
+    for part in range(REACH, SWING + 1):
+        scale, own = ints[earlier + part], ints[state + part]
+        for i in range(ints[ints[state + LEVEL] + MODES]):
+            numbers[own + i] = max(numbers[own + i], numbers[scale + i])
 
 
 @compiled

@@ -15,7 +15,7 @@ from multiphi_exudyn.levels.level.level_rows import level_rows
 from multiphi_exudyn.mathematics.eigenproblems.modes import aligned_clusters, cluster_end
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 
-__all__ = ["build_level"]
+__all__ = ["build_level", "drop_damping_of_free_modes"]
 
 UNDAMPED = 1e-12  # of the largest damping: round-off of projecting it
 NEUTRAL = 1e-12  # of mu: an |omega^2| below it is round-off of zero
@@ -50,7 +50,7 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
         rows = level_rows(base, closed, stiffnesses, squares, vectors, accuracy, check=False)
     assert rows is not None, "it is None only where clusters are checked"
     if not is_vibrating:
-        _drop_damping_of_free_modes(base, closed, squares == 0, rows.damping)
+        drop_damping_of_free_modes(base, closed, squares == 0, rows.damping)
     return Level(
         closed=tuple(base.links[i].name for i in closed if i not in base.laws),
         indices=indices,
@@ -123,7 +123,7 @@ def _aligned_free_modes(
     return squares, vectors
 
 
-def _drop_damping_of_free_modes(base: ModalBase, closed: Sequence[int], free: np.ndarray, damping: np.ndarray) -> None:
+def drop_damping_of_free_modes(base: ModalBase, closed: Sequence[int], free: np.ndarray, damping: np.ndarray) -> None:
     """Put zeros in place of round-off in the damping matrix (r, r) of zero-frequency modes, ``free`` (r,).
 
     Round-off would damp a mode that has no other damping.

@@ -27,6 +27,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.levels.level.build_level import drop_damping_of_free_modes
 from multiphi_exudyn.levels.level.level import Asymptotic, Level
 from multiphi_exudyn.levels.level.level_override import LevelOverride
 from multiphi_exudyn.mathematics.round_off import ZERO
@@ -56,8 +57,11 @@ class SlidingLevel(Level):
 
     @property
     def damping_matrix(self) -> np.ndarray:
-        """D - Psi^T U L'_o (r, r) [1/s]."""
-        return self.damping - self.pulled @ self.force_rate_rows[list(self.sliders)]
+        """D - Psi^T U L'_o (r, r) [1/s]; of zero-frequency modes without what is round-off of the damping."""
+        added, free = -self.pulled @ self.force_rate_rows[list(self.sliders)], self.squares == 0
+        if np.any(free):
+            drop_damping_of_free_modes(self.base, list(self.indices), free, added)
+        return self.damping + added
 
     @functools.cached_property
     def pulled(self) -> np.ndarray:

@@ -188,7 +188,9 @@ def simultaneous(
             terms += size
             steepest += size * magnitude(waves, rates + j)
             if ints[powers + j] > 0:
-                slope += ints[powers + j] / numbers[scales] * (a * waves[scratch_wave + j - 1]).real
+                power = ints[powers + j] / numbers[scales]
+                slope += power * (a * waves[scratch_wave + j - 1]).real
+                steepest += power * magnitude(waves, signals + s * p + j) * magnitude(waves, scratch_wave + j - 1)
         allowed = max(ZERO * terms, -slope * instant)
         falls = terms > 0.0 and slope < -ZERO * steepest and value <= min(SIMULTANEOUS * terms, allowed)
         ints[result + s] = 1 if s == first or falls else 0
@@ -204,6 +206,7 @@ def first_sign(
     basis: int,
     signal: int,
     constant: float,
+    constant_size: float,
     sizes: int,
     since: int,
     scratch: int,
@@ -211,8 +214,9 @@ def first_sign(
 ) -> int:
     """Return the sign of a signal just after t = 0, +1 or -1; 0 if it vanishes.
 
-    It is the sign of the first derivative, of order ``since`` or more, that is not round-off of its terms. sizes:
-    offset of the sums of |terms| (p,) of the coefficients. scratch, scratch_wave: p working numbers and waves.
+    It is the sign of the first derivative, of order ``since`` or more, that is not round-off of its terms.
+    constant_size: the sum of the |terms| of the constant. sizes: offset of those (p,) of the coefficients. scratch,
+    scratch_wave: p working numbers and waves.
     """
     p, powers, rates, unit = (
         ints[basis + SIZE],
@@ -225,7 +229,7 @@ def first_sign(
         numbers[scratch + j] = numbers[sizes + j]
     for order in range(DERIVATIVES):
         value = constant if order == 0 else 0.0
-        noise = ZERO * abs(value)
+        noise = ZERO * constant_size if order == 0 else 0.0
         for j in range(p):
             if ints[powers + j] == 0:
                 value += waves[scratch_wave + j].real

@@ -43,8 +43,8 @@ class ForceLaw:
 
     F is approximated by straight segments between knots on it. The segment of q is the law's state: "0" at q_m, the
     zero of F nearest to q = 0, "+1", "+2", ... above it, "-1", "-2", ... below. Beyond the span the last segments are
-    continued. ``contact_force`` of a law is -F, ``gap`` is q - q_m. Two laws are equal only if they are the same
-    object.
+    continued, and a run that goes there has a warning. ``contact_force`` of a law is -F, ``gap`` is q - q_m. Two laws
+    are equal only if they are the same object.
 
     Parameters
     ----------
@@ -194,6 +194,11 @@ class ForceLaw:
     def knot_counts(self) -> tuple[int, int]:
         """Numbers of knots with a change of slope, above segment "0" and below it."""
         return len(self._above), len(self._below)
+
+    def is_last(self, state: int) -> bool:
+        """Return whether a state is a last segment, at one of the ends of the span."""
+        up, down = self.knot_counts
+        return state == up or state == up + down or (state == 0 and not down)
 
     @property
     def further(self) -> tuple[Link, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.packing.level_arrays import LevelArrays
+from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
 from multiphi_exudyn.time.loop.chatter import limits
 from multiphi_exudyn.time.loop.loop_record import ACCUMULATED
 
@@ -24,7 +25,7 @@ def failure(arrays: LevelArrays) -> NumericalFailure:
     complete = model.level_at(()).modes == model.base.modes.count
     window, limit = limits(model)
     sentences = {
-        a.NOT_FINITE: "the motion is not finite",
+        a.NOT_FINITE: "the motion is not finite" + _laws_at_an_end(arrays),
         a.TOO_LONG: f"search for the next event: got motion of up to {facts[0] / (2 * math.pi):g} Hz, whose "
         f"samples every {facts[1]:g} s until the end, in {facts[2]:g} s, would take too long; "
         "need fewer modes or a shorter run",
@@ -41,3 +42,16 @@ def failure(arrays: LevelArrays) -> NumericalFailure:
         "need one value of restitution",
     }
     return NumericalFailure(sentences[int(ints[a.CAUSE])])
+
+
+def _laws_at_an_end(arrays: LevelArrays) -> str:
+    """Return what is said of force laws that are continued beyond their spans where a run has failed."""
+    ints, level = arrays.ints, int(arrays.ints[a.CURRENT + a.LEVEL])
+    states = ints[ints[level + a.STATES] :][: ints[a.ELEMENTS]].tolist() if level else []
+    laws = [
+        law
+        for law, state in zip(arrays.levels.model.contacts, states, strict=False)
+        if isinstance(law, ForceLaw) and law.is_last(state)
+    ]
+    spans = ", ".join(f"{law.name!r} ({law.knots[0]:g}, {law.knots[-1]:g})" for law in laws)
+    return f"; force laws whose last segments would be continued beyond their spans: {spans}" if laws else ""

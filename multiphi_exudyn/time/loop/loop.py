@@ -88,8 +88,8 @@ from multiphi_exudyn.events.law.monitoring import arm, collect_requests, flag_re
 from multiphi_exudyn.events.states.channel_values import keep_drive, load_piece, piece_end, set_drive
 from multiphi_exudyn.events.states.defect_sums import add_defect, lacks_struck_defects
 from multiphi_exudyn.events.states.energies import energy, kinetic, pattern_work, potential, strain
-from multiphi_exudyn.events.states.flow import expand, state_at
-from multiphi_exudyn.events.states.state_arrays import copy_state, measure
+from multiphi_exudyn.events.states.flow import expand, scale_by_terms, state_at
+from multiphi_exudyn.events.states.state_arrays import copy_state, keep_scales, measure
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mathematics.response.basis_arrays import SCALES
 from multiphi_exudyn.mathematics.search.zero_crossing import INSTANT, NONE, first_descent
@@ -243,9 +243,13 @@ def advance_segment(ints: Ints, numbers: Numbers, waves: Waves, end: float) -> i
     if ints[PRESCRIBED] > 0:
         set_drive(ints, numbers, waves, ints[DRIVE_NEXT], elapsed, numbers[INSTANT_TIME], end)
     measure(ints, numbers, REACHED)
+    if elapsed > 0.0:
+        scale_by_terms(ints, numbers, waves, REACHED)
     ints[SUMMED] = work_of_segment(ints, numbers, waves, elapsed) if ints[WORKING] == 1 else 0
     fastest = numbers[ints[ints[FLOW_BASIS] + SCALES] + 1]
     at_once = elapsed <= (INSTANT / fastest if fastest > 0.0 else 0.0)
+    if at_once:
+        keep_scales(ints, numbers, CURRENT, REACHED)
     sample_motion_size(ints, numbers, waves)
     status = OK
     if decision_due > 0:

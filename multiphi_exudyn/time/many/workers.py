@@ -23,6 +23,7 @@ from multiphi_exudyn.time.many.batch import Batch
 from multiphi_exudyn.time.reliability.impact_warnings import is_taking, spread_contacts
 from multiphi_exudyn.time.reliability.law_warnings import approximated_laws
 from multiphi_exudyn.time.reliability.run_warnings import ModelWarnings
+from multiphi_exudyn.time.reliability.span_warnings import laws_at_an_end
 from multiphi_exudyn.time.reliability.truncation_warnings import indicator_threshold, truncation_warnings
 from multiphi_exudyn.time.run.motion import Motion, carry
 from multiphi_exudyn.time.run.refinement import refined
@@ -138,6 +139,7 @@ class Task:
             if needs_trajectory
             or not (batch.is_balanced(k) and batch.has_defects(k))
             or (spread and is_taking(batch.run_numbers[k]))
+            or laws_at_an_end(model, batch.visited(k))
         ]
         motions = [(k, batch.motion(k)) for k in separate]  # first: warnings may rebuild the arrays
         warnings = self._from_numbers(batch, [k for k in runs if k not in separate])

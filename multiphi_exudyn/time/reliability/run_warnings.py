@@ -19,6 +19,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "lost energy: ..."        energy lost to truncation, of the largest of the run, where displacements hold
     "undamped modes: ..."     modes for which a list of modal ratios has none
     "damping ratios: ..."     ratios that look like per cent
+    "law span: ..."           a force law that the motion drives out of its span (span_warnings.py)
     "missing modes: ..."      contacts of a structure of modes alone, where its static flexibility is not known
     "linear range: ..."       result of the model's own validity check
     "cluster: ..."            levels that keep more modes than asked for, so that no modes of one frequency are parted
@@ -52,6 +53,7 @@ from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
 from multiphi_exudyn.time.reliability.impact_warnings import impact_warnings, is_taking, mesh_warnings, spread_contacts
 from multiphi_exudyn.time.reliability.law_warnings import approximated_laws, law_warnings
 from multiphi_exudyn.time.reliability.ledger_warnings import ledger_warnings
+from multiphi_exudyn.time.reliability.span_warnings import laws_at_an_end, span_warnings
 from multiphi_exudyn.time.reliability.truncation_warnings import energy_warning, truncation_warnings, verdict_of
 from multiphi_exudyn.time.segments.segment import Segments
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
@@ -77,7 +79,8 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     """Warnings of a run, one sentence each; tolerance: the one that decided its modes.
 
     All warnings but those of the ledger and of truncation are the same for runs of one length in the same levels, and
-    are cached for them, unless friction or the model's own check needs the motion of every run.
+    are cached for them, unless friction, a force law that is approximated or at an end of its span, or the model's own
+    check needs the motion of every run.
     """
     record, model = trajectory.ending.record, trajectory.model
     visited, cache = record.visited, record.arrays.levels.told
@@ -109,9 +112,9 @@ class ModelWarnings:
     """Warnings of a model and of the visited levels, which need no motion.
 
     rigid: whether there is a rigid contact. spread: names of those whose effective mass the mesh decides. needs_motion:
-    whether friction, a force law, or the model's own check, needs the motion of every run. before, clusters: warnings.
-    fastest: highest frequency of the open level [Hz]. slowest: lowest nonzero frequency of the levels [rad/s]. ample: a
-    duration [s] in which all modes move.
+    whether friction, a force law that is approximated or at an end of its span, or the model's own check, needs the
+    motion of every run. before, clusters: warnings. fastest: highest frequency of the open level [Hz]. slowest: lowest
+    nonzero frequency of the levels [rad/s]. ample: a duration [s] in which all modes move.
     """
 
     rigid: bool
@@ -140,7 +143,9 @@ class ModelWarnings:
         return cls(
             any(contact.rigid for contact in model.contacts),
             spread_contacts(model),
-            model.general or model.validity is not None or bool(approximated_laws(model)),
+            model.general
+            or model.validity is not None
+            or bool(approximated_laws(model) or laws_at_an_end(model, [v.states for v in loaded])),
             (*damping_warnings(model), *missing_modes(model), *static),
             tuple(cluster_warnings(levels)),
             fastest,
@@ -151,7 +156,7 @@ class ModelWarnings:
     def for_run(self, trajectory: Trajectory) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Warnings of a run before and after those of truncation.
 
-        The same for all runs in the same levels, unless friction or the model's own check needs the motion.
+        The same for all runs in the same levels, unless ``needs_motion``.
         """
         before, after, excitation = self.before, self.clusters, trajectory.segments.levels[0].excitation
         brief = trajectory.t_end - trajectory.start.time < self.ample
@@ -164,13 +169,14 @@ class ModelWarnings:
         return before, after
 
     def _of_motion(self, trajectory: Trajectory) -> Iterator[str]:
-        """Warnings of the model's own check, of slow modes, and of friction in a run."""
+        """Warnings of the model's own check, of slow modes, of force laws, and of friction in a run."""
         model = trajectory.model
         if model.validity is not None:
             yield from model.validity(trajectory)
         yield from _slow_mode(trajectory, self.slowest)
         if self.needs_motion:
             yield from law_warnings(trajectory)
+            yield from span_warnings(trajectory)
         if model.general:
             yield from friction_warnings(trajectory.segments, model)
             yield from impact_warnings(trajectory)

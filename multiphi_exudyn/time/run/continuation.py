@@ -24,7 +24,7 @@ from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["continued_start", "stop_displacements", "with_final_velocity"]
 
-CONTINUOUS = 1e-9  # of the position of a stop: a smaller difference is within the accuracy of its motion
+CONTINUOUS = 1e-9  # of the travel of a stop: a smaller difference is within the accuracy of its motion
 
 
 def continued_start(trajectory: Trajectory, levels: LoadedLevels, rewound: bool = False) -> Start:
@@ -44,7 +44,7 @@ def continued_start(trajectory: Trajectory, levels: LoadedLevels, rewound: bool 
     vectors = level.level.vectors[:, :r]
     xi = np.concatenate([state.displacement[:r] + vectors.T @ jump, w])
     xi_t = np.concatenate([state.velocity[:r] + vectors.T @ velocity_jump, w_t])
-    _check_stops(level, stops_now, stops_before)
+    _check_stops(level, stops_now, stops_before, _stop_slack(level) + _stop_slack(before))
     gaps = model.base.gaps - stops_now
     gaps[held_links] -= held
     return Start(
@@ -76,14 +76,23 @@ def stop_displacements(state: State) -> np.ndarray:
     return excitation.moved(state.displacement[r : r + excitation.prescribed])
 
 
-def _check_stops(level: LoadedLevel, now: np.ndarray, earlier: np.ndarray) -> None:
-    """Refuse loads under which the stop of a rigid contact jumps."""
-    for contact, new, old in zip(level.level.base.links, now.tolist(), earlier.tolist(), strict=True):
-        if contact.rigid and abs(new - old) > CONTINUOUS * (abs(new) + abs(old)):
+def _check_stops(level: LoadedLevel, now: np.ndarray, earlier: np.ndarray, slack: np.ndarray) -> None:
+    """Refuse loads under which the stop of a rigid contact jumps by more than the accuracy ``slack`` of its motions."""
+    allowed = slack + CONTINUOUS * (np.abs(now) + np.abs(earlier))
+    for contact, jump, most in zip(level.level.base.links, now - earlier, allowed, strict=True):
+        if contact.rigid and abs(jump) > most:
             raise MultiPhiValueError(
-                f"loads: the stop of the rigid contact {contact.name!r} jumps by {new - old:g} m where the run goes "
+                f"loads: the stop of the rigid contact {contact.name!r} jumps by {jump:g} m where the run goes "
                 "on, need a motion that goes on without a jump"
             )
+
+
+def _stop_slack(level: LoadedLevel) -> np.ndarray:
+    """Accuracy (c,) [m] of the motions of stops: that of their travel, and of the courses interpolated."""
+    excitation = level.excitation
+    errors = np.array([history.error for history in excitation.histories])
+    interpolated = np.abs(excitation.stops[:, : excitation.prescribed]) @ errors
+    return np.asarray(CONTINUOUS * excitation.stop_travel + interpolated)
 
 
 def _mode_count(level: LoadedLevel) -> int:

@@ -15,6 +15,7 @@ import numpy as np
 
 from multiphi_exudyn.mechanics.loads.loads import Load
 from multiphi_exudyn.mechanics.loads.time_functions import Smooth, Sweep
+from multiphi_exudyn.time.segments.segment import Segment, as_segments
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["refined", "to_tolerance"]
@@ -54,5 +55,12 @@ def _interpolation_error(trajectory: Trajectory) -> float:
     error_bound = trajectory.t_end * float(np.linalg.norm(np.abs(level.channels.force[:, : len(errors)]) @ errors))
     if error_bound == 0:
         return 0.0
-    energies = np.asarray(trajectory.energy(np.linspace(trajectory.start.time, trajectory.t_end, SAMPLES)))
+    times = np.linspace(trajectory.start.time, trajectory.t_end, SAMPLES)
+    energies = as_segments(trajectory.segments).evaluated(times, "right", _size_of_energy)
     return error_bound / max(math.sqrt(2 * float(np.max(energies))), np.finfo(float).tiny)
+
+
+def _size_of_energy(segment: Segment, times: np.ndarray) -> np.ndarray:
+    """Kinetic energy and the size of strain energy (k,) [J], which force laws may make negative."""
+    level = segment.level
+    return np.asarray(level.kinetic(segment.modal(times, 1)) + np.abs(level.strain(segment.modal(times))))

@@ -61,7 +61,7 @@ def _forced(level: LoadedLevel, rate: complex, terms: np.ndarray, horizon: float
     forces = scaled_terms @ channels.force.T
     if np.any(channels.force_rate):
         forces = forces + differentiated(rate, scaled_terms, horizon) @ channels.force_rate.T
-    x = particular(modal.squares, modal.damping, level.response, rate, forces, horizon)
+    x = particular(modal.squares, modal.damping_matrix, level.response, rate, forces, horizon)
     block = np.zeros((max(len(x), len(scaled_terms)), modal.modes + scaled_terms.shape[1]), complex)
     block[: len(x), : modal.modes], block[: len(scaled_terms), modal.modes :] = x, scaled_terms
     return block

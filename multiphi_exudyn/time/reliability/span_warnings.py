@@ -1,0 +1,75 @@
+"""Span warnings: force laws that a motion drives out of the span on which they are given.
+
+Beyond its span the last segment of a law is continued. That is an extrapolation, and where the segment is falling the
+motion may grow without limit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+from scipy.optimize import brentq
+
+from multiphi_exudyn.levels.model.model import MultiPhiModel
+from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
+from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+
+__all__ = ["laws_at_an_end", "span_warnings"]
+
+BEYOND = 1e-9  # of the span's width: a law is not left by less
+FEWEST, PER_PERIOD = 9, 8  # samples of a segment of the motion, and of a period of its level's highest frequency
+MOST = 20_000  # samples of a run
+
+
+def laws_at_an_end(model: MultiPhiModel, visited: Iterable[Sequence[int]]) -> list[ForceLaw]:
+    """Return the force laws that are in a last segment of theirs in one of the levels, given by their states."""
+    laws = [(i, law) for i, law in enumerate(model.contacts) if isinstance(law, ForceLaw)]
+    if not laws:
+        return []
+    levels = list(visited)
+    return [law for i, law in laws if any(law.is_last(states[i]) for states in levels)]
+
+
+def span_warnings(trajectory: Trajectory) -> Iterator[str]:
+    """Yield a warning of every law that leaves its span, with the time and the farthest place reached."""
+    for law in laws_at_an_end(trajectory.model, trajectory.segments.visited):
+        yield from _left_span(trajectory, law)
+
+
+def _left_span(trajectory: Trajectory, law: ForceLaw) -> Iterator[str]:
+    low, high = float(law.knots[0]), float(law.knots[-1])
+    times = _samples(trajectory, law)
+    places = law.centre + np.asarray(trajectory.gap(law.name, times))
+    beyond = np.maximum(places - high, low - places) / (high - low)
+    if not np.any(beyond > BEYOND):
+        return
+    first = int(np.argmax(beyond > BEYOND))
+    farthest = int(np.argmax(beyond))
+    time = float(times[first])
+    if first > 0 and beyond[first - 1] <= 0:
+        edge = high if places[first] > high else low
+        time = brentq(lambda t: law.centre + float(trajectory.gap(law.name, t)) - edge, times[first - 1], times[first])
+    how = "leaves" if first else "starts outside"
+    yield (
+        f"law span: force law {law.name!r} {how} its span ({low:g}, {high:g}) at t = {time:.6g} s and reaches "
+        f"{places[farthest]:.6g} at t = {times[farthest]:.6g} s, where its last segment is continued; give it a span "
+        "that holds the motion, or end the run before"
+    )
+
+
+def _samples(trajectory: Trajectory, law: ForceLaw) -> np.ndarray:
+    """Return times at which a law is in a last segment, in order."""
+    segments, index = trajectory.segments, trajectory.model.index(law.name)
+    is_last = np.array([law.is_last(level.states[index]) for level in segments.levels])
+    fastest = np.array([level.modal.highest_frequency for level in segments.levels])
+    chosen = np.flatnonzero(is_last[segments.numbers])
+    starts, ends = segments.starts[chosen], segments.ends[chosen]
+    counts = np.ceil(PER_PERIOD * fastest[segments.numbers[chosen]] * (ends - starts)) + FEWEST
+    share = min(1.0, MOST / float(np.sum(counts)))
+    parts = [
+        np.linspace(start, end, max(3, math.ceil(share * count)))
+        for start, end, count in zip(starts, ends, counts.tolist(), strict=True)
+    ]
+    return np.unique(np.concatenate(parts))

@@ -1,0 +1,81 @@
+"""A force law that the motion drives out of its span is told: its name, the time, and how far it went."""
+
+import re
+
+import numpy as np
+import pytest
+
+import multiphi_exudyn as mp
+
+TOLD = re.compile(
+    r"law span: force law '(.*)' (?:leaves|starts outside) its span "
+    r"\((.*), (.*)\) at t = (.*) s and reaches (.*) at t = (.*?) s"
+)
+
+
+def electrode(damping=0.1):
+    """A switch that an electrostatic force pulls in: beyond the span of the law it grows for ever."""
+    structure = mp.LinearStructure([[1.0]], [[1.0]], [[damping]], points={"x": 0})
+    law = mp.ForceLaw("x", lambda q: -0.2 / (1 - q) ** 2, span=(-0.2, 0.9), tolerance=1e-3, name="electrode")
+    return mp.MultiPhiModel(structure, [law])
+
+
+def told(run):
+    found = [TOLD.match(sentence) for sentence in run.warnings if sentence.startswith("law span")]
+    assert len(found) <= 1
+    return (found[0][1], *map(float, found[0].groups()[1:])) if found else None
+
+
+class TestLeaving:
+    @pytest.mark.parametrize("end", [4.0, 20.0])
+    def test_is_told_with_time_and_place(self, end):
+        run = mp.simulate(electrode(), end)
+        name, low, high, time, place, when = told(run)
+        assert (name, low, high, when) == ("electrode", -0.2, 0.9, end)
+        assert run.at("x", time) == pytest.approx(0.9, abs=1e-4)
+        assert place == pytest.approx(run.at("x", end), rel=1e-5)
+        assert place > 1e5
+
+    def test_is_issued_with_its_remedy(self):
+        with pytest.warns(mp.MultiPhiWarning, match="give it a span that holds the motion"):
+            mp.simulate(electrode(), 4.0)
+
+    def test_is_not_told_of_a_run_that_ends_before(self):
+        run = mp.simulate(electrode(), 3.1)
+        assert run.at("x", 3.1) > 0.8
+        assert told(run) is None
+
+    def test_names_the_law_where_the_motion_overflows(self):
+        run = mp.simulate(electrode(), 100.0)
+        assert run.status == "failed"
+        assert "not finite" in run.message
+        assert "'electrode' (-0.2, 0.9)" in run.message
+
+    @pytest.mark.parametrize("side", [1.0, -1.0])
+    def test_of_a_table_is_told_on_either_side(self, side):
+        """Also where one straight line is the whole law, so that no event tells of it."""
+        structure = mp.LinearStructure([[1.0]], [[0.0]], points={"x": 0})
+        law = mp.ForceLaw("x", ([-1.0, 2.0], [-4.0, 8.0]), name="line")
+        run = mp.simulate(mp.MultiPhiModel(structure, [law]), 30.0, velocity=[5.0 * side])
+        name, low, high, time, place, _ = told(run)
+        edge = 2.0 if side > 0 else -1.0
+        assert (name, low, high) == ("line", -1.0, 2.0)
+        assert time == pytest.approx(np.arcsin(edge * side * 2.0 / 5.0) / 2.0, abs=1e-5)
+        assert abs(place) == pytest.approx(2.5, rel=0.02)
+
+    def test_up_to_the_end_itself_is_within(self):
+        structure = mp.LinearStructure([[1.0]], [[0.0]], points={"x": 0})
+        law = mp.ForceLaw("x", ([-1.0, 0.0, 1.0], [-8.0, 0.0, 4.0]))
+        run = mp.simulate(mp.MultiPhiModel(structure, [law]), 9.0, displacement=[1.0])
+        assert told(run) is None
+        outside = mp.simulate(mp.MultiPhiModel(structure, [law]), 9.0, displacement=[1.01])
+        assert told(outside)[3] == 0.0
+        assert "starts outside its span" in " ".join(outside.warnings)
+
+    def test_is_told_of_each_of_many_runs_as_of_it_alone(self):
+        model = electrode(0.4)
+        speeds = np.array([[0.0], [0.5], [-0.1], [0.3]])
+        many = mp.simulate_many(model, 2.6, velocities=speeds, points=["x"])
+        alone = [mp.simulate(model, 2.6, velocity=speed) for speed in speeds]
+        assert [tuple(run.warnings) for run in alone] == list(many.warnings)
+        assert {told(run) is None for run in alone} == {True, False}
