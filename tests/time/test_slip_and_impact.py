@@ -117,3 +117,48 @@ def test_continued_at_the_second_bounce_and_in_a_batch_it_is_the_same_motion():
     times = np.linspace(0.0, 3.0, 61)
     many = mp.simulate_many(model, 3.0, np.array([[0.7], [1.0]]), loads=loads, points=["y"], times=times)
     assert_allclose(many.samples[1, 0], whole.at("y", times), rtol=0, atol=EXACT)
+
+
+def test_a_slip_that_comes_first_at_the_instant_of_the_impact_ends_with_it():
+    """Three springs reach their limits at the stop, in whatever order round-off gives their instants."""
+    structure = mp.LinearStructure([[1.0]], [[10.0]], points={"y": 0})
+    stops = [mp.UnilateralContact("stop", "y", 0.2, restitution=0.3)]
+    friction = [
+        mp.Friction(f"spring{i}", "y", 1.0, stiffness=k, velocity=v)
+        for i, (k, v) in enumerate([(200.0, -1.0), (200.0, 0.0), (10.0, 0.0)])
+    ]
+    loads = [mp.ConstantLoad("y", -3.0)]
+    assert_lawful(
+        mp.simulate(mp.MultiPhiModel(structure, [*stops, *friction]), 3.0, displacement=[2.0], loads=loads), loads
+    )
+
+
+def chain_at_two_stops():
+    joints = 100.0 * np.array([[1.01, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    structure = mp.LinearStructure(np.diag([1.0, 1.0, 2.0]), joints, points={"y0": 0, "y1": 1, "y2": 2})
+    stops = [mp.UnilateralContact(f"stop {at}", at, 0.5, restitution=0.5) for at in ("y0", "y1")]
+    loads = [mp.ConstantLoad(f"y{i}", -10.0 * mass) for i, mass in enumerate((1, 1, 2))]
+    start = {"displacement": -0.5 * np.ones(3), "velocity": -np.ones(3)}
+    return mp.MultiPhiModel(structure, [*stops, *springs(1.0, stiffness=200.0, at="y0")]), loads, start
+
+
+def damped_chain_between_stops():
+    joints = np.array([[10.0, -10.0, 0.0], [-10.0, 60.0, -50.0], [0.0, -50.0, 50.0]])
+    masses = np.diag([2.0, 2.0, 1.0])
+    structure = mp.LinearStructure(masses, joints, 0.02 * joints + 0.1 * masses, {"y0": 0, "y1": 1, "y2": 2})
+    stops = [mp.UnilateralContact(f"stop {at}", at, 0.2, restitution=0.5) for at in ("y2", "y0")]
+    friction = [
+        mp.Friction(f"spring{i}", "y2", limit, static_limit=static, stiffness=k)
+        for i, (limit, static, k) in enumerate([(5.0, 5.0, 20.0), (2.0, 3.0, 200.0), (1.0, 1.5, 20.0)])
+    ]
+    loads = [mp.ConstantLoad(f"y{i}", -3.0 * mass) for i, mass in enumerate((2, 2, 1))]
+    return mp.MultiPhiModel(structure, [*stops, *friction]), loads, {"displacement": 2.0 * np.ones(3)}
+
+
+@pytest.mark.parametrize("scene", [chain_at_two_stops, damped_chain_between_stops])
+def test_the_last_bounce_ends_though_a_spring_slips_first_at_its_instant(scene):
+    """A contact that comes back from its last bounce closes, whatever else changes at that instant."""
+    model, loads, start = scene()
+    run = mp.simulate(model, 3.0, loads=loads, **start)
+    assert_lawful(run, loads)
+    assert len(run.events) < 200

@@ -82,7 +82,8 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     """Warnings of a run, one sentence each; tolerance: the one that decided its modes.
 
     All warnings but those of the ledger and of truncation are the same for runs of one length in the same levels, and
-    are cached for them, unless friction, a force law or the model's own check needs the motion of every run.
+    are cached for them, unless friction, a force law that is approximated or at an end of its span, or the model's own
+    check needs the motion of every run.
     """
     record, model = trajectory.ending.record, trajectory.model
     visited, cache = record.visited, record.arrays.levels.told
@@ -147,8 +148,7 @@ class ModelWarnings:
             spread_contacts(model),
             model.general
             or model.validity is not None
-            or bool(approximated_laws(model))
-            or bool(laws_at_an_end(model, [v.states for v in loaded])),
+            or bool(approximated_laws(model) or laws_at_an_end(model, [v.states for v in loaded])),
             (*digit_warnings(model), *damping_warnings(model), *missing_modes(model), *static),
             tuple(cluster_warnings(levels)),
             fastest,
