@@ -22,10 +22,11 @@ from multiphi_exudyn.mechanics.elements.friction import Friction
 from multiphi_exudyn.mechanics.files.matrix_files import read_structure
 from multiphi_exudyn.mechanics.loads.loads import FunctionLoad, HarmonicLoad, SampledLoad, SweepLoad
 from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion
-from multiphi_exudyn.mechanics.loads.samples import Sampled
+from multiphi_exudyn.mechanics.loads.samples import Accelerogram, Sampled
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.loads.time_functions import Harmonic, Smooth, Sweep
 from multiphi_exudyn.mechanics.structures.assembly import Assembly, assemble
+from multiphi_exudyn.mechanics.structures.condensed_structure import CondensedStructure, condensed_structure
 from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.structures.modal_structure import ModalStructure, structure_from_modes
 from multiphi_exudyn.mechanics.structures.structure import LinearStructure
@@ -41,10 +42,12 @@ from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from multiphi_exudyn.version import __version__
 
 __all__ = [
+    "Accelerogram",
     "Assembly",
     "BaseMotion",
     "Beam",
     "Clamp",
+    "CondensedStructure",
     "ConstantLoad",
     "Equilibrium",
     "Event",
@@ -85,6 +88,7 @@ __all__ = [
     "UpTo",
     "__version__",
     "assemble",
+    "condensed_structure",
     "frequency_response",
     "load_trajectory",
     "planar_beam",

@@ -5,5 +5,6 @@ such a sum first falls through zero; functions of time as piecewise exponentials
 small complementarity problem of contact and friction; products of vectors; round-off; functions on flat buffers,
 compiled or plain.
 
-Order: bounded_cache, compiling, round_off, orthonormal, eigenproblems, response, search, complementarity, functions.
+Order: blas_threads, bounded_cache, compiling, round_off, orthonormal, eigenproblems, response, search,
+complementarity, functions.
 """

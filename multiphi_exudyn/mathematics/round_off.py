@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-__all__ = ["ALIKE", "BALANCED", "CLEAR", "DEFECTIVE", "FOLLOWING", "INDEPENDENT", "PRODUCT", "SLOW", "WORST_CONDITION"]
-__all__ += ["ZERO", "all_finite", "drop_round_off", "sign_of"]
+__all__ = ["ALIKE", "BALANCED", "CLEAR", "DEFECTIVE", "FOLLOWING", "INDEPENDENT", "MASSLESS", "PRODUCT", "SLOW"]
+__all__ += ["WORST_CONDITION", "ZERO", "all_finite", "drop_round_off", "sign_of"]
 
 ZERO = 1e-13  # of the sum of |terms|: a sum below it is round-off
 DEFECTIVE = 1e5  # condition of eigenvectors, from which close ones form a cluster; at a double root 1e8
@@ -23,6 +23,7 @@ FOLLOWING = 10 * INDEPENDENT  # of its terms: allowed violation of an inequality
 ALIKE = 1e-10  # of the larger one: two violations, distances or reserves that are equal but for round-off
 SLOW = 0.1  # of 1 / |lambda|: a shorter motion is given by a few powers of time, without 1 / lambda
 BALANCED = 1e-9  # of the sum of |forces|: a resultant below it is round-off of their directions and of modes
+MASSLESS = 1e-9  # of the terms of M z: a smaller remainder is round-off of matrices in files, the motion has no mass
 CLEAR = 2 * ZERO  # of a sum's terms: a larger sum is above ZERO for any order of addition
 
 

@@ -8,15 +8,16 @@ zero; no nudge excuses a status.
 from dataclasses import dataclass, replace
 
 import brute_force
+import campaign_bodies
 import numpy as np
 from campaign_scenes import later, scaled
+from campaign_scenes.parts import NEAR
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.study.stability.law_check import broken_laws
 from multiphi_exudyn.study.stability.run_laws import complaints
 from reference_models.body_alone import solve_body_alone
 
-NEAR = 1e-6  # of the largest value: two motions are the same
 NO_MOTION = 1e-6  # of a scene's length and speed
 NUDGE = 1e-12  # of the start and of the stiffness
 DRIFTED = 1e-10  # of the largest value: what a sensitive motion has drifted before the event that makes it NEAR
@@ -32,6 +33,7 @@ OTHERWISE = (  # brute force is tried so where it and the run differ: another to
     {"rocking": 20},
 )
 IMPULSE = 1e-5  # of the largest: what momentum may miss, of which a truncated load misses more than motion
+PULLING = 1e-8  # of a contact's largest force: round-off of a release
 RUBBED = 1e-6  # of the energy: what friction takes
 BODY_STEPS = 400  # of the Exudyn body, each of which ends exactly
 BODY_NUDGE = 1e-9  # of the start and of the stiffness: what Newton's iterations leave of a state
@@ -74,6 +76,9 @@ def instants(scene):
 
 def judged(scene):
     """([(kind, cause), ...], digest) of a scene."""
+    if scene.in_exudyn:
+        found = campaign_bodies.JUDGES[scene.in_exudyn](scene)
+        return found, [found[0][0], 0, []]
     try:
         motion = native(scene)
     except mp.MultiPhiError as refusal:
@@ -118,7 +123,10 @@ def _impulse(scene, runs):
     time, length, mass = (2.0**power for power in scene.units)
     total = np.zeros(len(scene.system.mass))
     for contact, stop in zip(runs[0].model.contacts, scene.system.stops, strict=False):
-        total += stop.row * sum(run.contact_impulse(contact.name, 0.0, run.t_end) for run in runs)
+        ends = [*(np.nextafter(run.t_end, 0.0) for run in runs[:-1]), runs[-1].t_end]  # what ends one, begins the next
+        total += stop.row * sum(
+            run.contact_impulse(contact.name, 0.0, end) for run, end in zip(runs, ends, strict=True)
+        )
     return total * time / (length * mass)
 
 
@@ -141,6 +149,11 @@ def _verdicts(scene, motion):
         return [("chatter", motion.message)], motion
     if motion.status != "ok":
         return [("named failure", motion.message)], motion
+    if scene.by_laws:
+        given = zip(motion.runs, motion.given, strict=True)
+        broken = [text for run, (loads, x, v) in given for text in broken_laws(run, loads, (x, v))]
+        verdict = "told: {}" if told(motion) else "failure: {}"
+        return [(verdict.format(text.split(":")[0]), text) for text in broken] or [("ok", motion.message)], motion
     found = [
         (f"failure: {text.split(':')[0]}", text)
         for run, given in zip(motion.runs, motion.given, strict=True)
@@ -212,9 +225,9 @@ def _otherwise(scene, motion, start, times, expected, found):
             other = motion_of(scene, brute_force.solved(scene.system, *start, times, **setting))
         except brute_force.NoAnswer:
             continue
-        if np.max(_errors(scene, motion, other)) <= NEAR:
+        if np.max(_errors(scene, motion, other)) <= scene.near:
             return []
-        if np.max(_errors(scene, other, expected)) > NEAR:
+        if np.max(_errors(scene, other, expected)) > scene.near:
             return [("unjudged", "brute force has not converged")]
     return found
 
@@ -238,8 +251,8 @@ def motion_of(scene, answer):
 def _difference(scene, motion, expected, kind, comparable):
     """What is to be said where two motions are not the same."""
     errors = _errors(scene, motion, expected, comparable)
-    if np.max(errors, initial=0.0) > NEAR:
-        at = int(np.argmax(errors > NEAR))
+    if np.max(errors, initial=0.0) > scene.near:
+        at = int(np.argmax(errors > scene.near))
         cause = f"off by {np.max(errors):.3g} of the largest, from t = {instants(scene)[at]:.6g} s"
         cause += f" ({motion.events} events, {expected.events})"
         return [("sensitive", cause) if sensitive(scene, motion, at) else (kind, cause)]
@@ -247,13 +260,53 @@ def _difference(scene, motion, expected, kind, comparable):
     if motion.impulse is not None and expected.impulse is not None:
         size = max(np.max(np.abs(expected.impulse)), _momentum(scene, expected), 1e-300)
         missing = float(np.max(np.abs(_shared_by_none(scene.system) @ (motion.impulse - expected.impulse)))) / size
-    if missing > IMPULSE:
+    if missing > IMPULSE * scene.near / NEAR:
         return [("failure: impulse", f"off by {missing:.3g} of the largest momentum")]
+    if found := _forces(scene, motion, expected, comparable):
+        return found
     if expected.rubbed is not None and abs(motion.rubbed - expected.rubbed) > RUBBED * max(
         expected.rubbed, _energy(scene, expected)
     ):
         return [("failure: friction", f"takes {motion.rubbed:.9g} J, {expected.rubbed:.9g}")]
     return []
+
+
+def _forces(scene, motion, expected, comparable):
+    """What is to be said where forces are not those that brute force's motion makes, or where a contact pulls."""
+    if scene.system is None or comparable is None or scene.frame is not None or scene.split:
+        return []
+    time, length, mass = (2.0**power for power in scene.units)
+    run, times = motion.runs[0], instants(scene)[comparable]
+    x, v = expected.displacement[:, comparable], expected.velocity[:, comparable]
+    size = [
+        max(np.max(np.abs(values), initial=0.0), scale) for values, scale in zip((x, v), expected.scale, strict=True)
+    ]
+    for contact, stop in zip(run.model.contacts, scene.system.stops, strict=False):
+        force = run.contact_force(contact.name, times * time) * (time**2 / (length * mass))
+        if np.min(force, initial=0.0) < -PULLING * np.max(np.abs(force), initial=0.0):
+            return [("failure: pulls", f"{contact.name} with {-np.min(force):.3g} of {np.max(np.abs(force)):.3g} N")]
+        if contact.rigid:
+            continue
+        z, rate = (np.zeros(len(times)) if stop.course is None else f(times) for f in _ways(stop))
+        gap = stop.row @ x + stop.gap - z
+        law = np.where(gap < 0, np.maximum(0.0, -stop.stiffness * gap - stop.damping * (stop.row @ v - rate)), 0.0)
+        allowed = scene.near * np.sum(np.abs(stop.row)) * (stop.stiffness * size[0] + stop.damping * size[1])
+        touching = (np.abs(gap) < scene.near * size[0]) & (stop.damping > 0)  # a damper's force jumps there
+        off = np.where(touching, 0.0, np.abs(force - law))
+        if np.max(off, initial=0.0) > allowed:
+            at = times[int(np.argmax(off))]
+            return [
+                (
+                    "failure: force",
+                    f"{contact.name} off by {np.max(off):.3g} N at t = {at:.6g} s, {allowed:.3g} allowed",
+                )
+            ]
+    return []
+
+
+def _ways(stop):
+    """z and z' of a stop as functions of time."""
+    return (stop.course.value, stop.course.rate) if stop.course is not None else (None, None)
 
 
 def _shared_by_none(system):

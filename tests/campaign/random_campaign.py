@@ -3,15 +3,18 @@
     python tests/campaign/random_campaign.py --kinds all --count 20000 --processes 2
 
 Case by case, each from its kind and number alone: no exception but a named one, and what must hold of every run
-(study/stability/run_laws.py). All kinds (campaign_scenes) but "plain" (strategies.py) are judged by brute force
-(campaign_judge.py), one in PLAIN_PYTHON of the plain ones by the loop as plain Python. With ``--kernels
-Prescott,Haswell`` the same cases run under each of these kernels of the linear algebra library, each in its own
-process, and their statuses, numbers of events and answers are compared.
+(study/stability, run_laws.py and law_check.py). All kinds (campaign_scenes) but "plain" (strategies.py) and "lattice"
+are judged by brute force (campaign_judge.py), one in PLAIN_PYTHON of the plain ones by the loop as plain Python. With
+``--kernels Prescott,Haswell`` the same cases run under each of these kernels of the linear algebra library, each in its
+own process, and their statuses, numbers of events and answers are compared.
 
 Kinds with dry friction: a slider alone, blocks, springs in series ("jenkins"), of all laws under several loads, beside
 contacts that give way, beside rigid ones ("friction impacts"), on bodies that nothing else holds, at rest exactly at
 their limits, in other units, and contacts that rub in proportion to their forces ("contact friction"). The energy that
 friction takes is compared too.
+
+"lattice": small integers and zeros, equal places, coinciding events, all elements together, judged by the law check
+alone (study/stability/law_check.py): ``--kinds lattice --count 20000``.
 
 Finished chunks stand in a file, so that a campaign that was stopped goes on where it was; the summary names every
 failing case with its cause. A case alone: ``--kinds viscous --first 17 --count 1``.
@@ -38,6 +41,7 @@ from campaign_scenes import KINDS, numbers, scene_of
 from strategies import built, recipe_of
 
 from multiphi_exudyn import MultiPhiError, MultiPhiWarning, simulate
+from multiphi_exudyn.study.stability.law_check import broken_laws
 from multiphi_exudyn.study.stability.run_laws import complaints
 from multiphi_exudyn.study.sweep.time_limit import TimeLimitExceeded, call_within
 from reference_models.exudyn_quiet import quiet
@@ -93,7 +97,8 @@ def _verdicts(number):
     run = _run(case)
     if run.message and "chatter" in run.message:  # a named failure of a run that need not have failed
         return [("chatter", run.message)]
-    found = [(f"failure: {text.split(':')[0]}", text) for text in complaints(run)]
+    told = [*complaints(run), *broken_laws(run, case.loads, (case.displacement, case.velocity))]
+    found = [(f"failure: {text.split(':')[0]}", text) for text in told]
     if number % PLAIN_PYTHON == 0 and (text := apart(run, _run(case, compiled=False))):
         sensitive = any(apart(run, _run(nudged(case, run, share))) for share in NUDGES)
         found.append(("sensitive" if sensitive else "failure: plain Python", text))

@@ -41,6 +41,15 @@ LIGHT = dict.fromkeys(KINDS, 3) | {
     "friction free": 5,
     "friction units": 9,
     "friction redundant": 8,
+    "lattice": 3,
+    "nearly free": 5,
+    "zero gaps": 3,
+    "at events": 3,
+    "dampers": 3,
+    "digits": 3,
+    "body statics": 0,
+    "body unmatched": 0,
+    "joints": 0,
 }  # quick ones in which something happens; random_campaign.py runs many
 
 
@@ -445,6 +454,15 @@ class TestJudge:
         monkeypatch.setattr(mp.Trajectory, "contact_impulse", lambda *given: 0.999 * impulse(*given))
         assert self.verdict() == ["failure: impulse"]
 
+    @pytest.mark.parametrize(
+        ("number", "factor", "told"), [(3, -1.0, "failure: pulls"), (3, 1.001, "failure: force"), (3, 1.0, "ok")]
+    )
+    def test_tells_a_force_that_pulls_or_is_not_that_of_the_motion(self, monkeypatch, number, factor, told):
+        force = mp.Trajectory.contact_force
+        monkeypatch.setattr(mp.Trajectory, "contact_force", lambda *given: factor * force(*given))
+        monkeypatch.setattr(campaign_judge, "laws_of", lambda *given: [])
+        assert [kind for kind, _ in judged("viscous", number)[0]] == [told]
+
     def test_tells_a_run_that_fails(self, monkeypatch):
         simulate = mp.simulate
         failed = {"status": "failed", "message": "at t = 1 s: chatter: too many"}
@@ -461,6 +479,42 @@ class TestJudge:
         scene = scene_of(self.KIND, self.NUMBER)
         motion = campaign_judge.native(scene)
         assert not campaign_judge.sensitive(scene, motion, campaign_judge.INSTANTS)
+
+
+class TestLattice:
+    """Scenes of small integers and zeros, judged by the law check alone."""
+
+    def test_draws_what_continuous_numbers_do_not(self):
+        scenes = [scene_of("lattice", number) for number in range(200)]
+        structures = [scene.model.structure for scene in scenes]
+        assert sum(not np.any(structure.stiffness) for structure in structures) > 40  # nothing holds the bodies
+        assert sum(structure.damping is not None and np.any(structure.damping) for structure in structures) > 20
+        rows = [
+            [structure.row(c.direction) for c in s.model.contacts]
+            for s, structure in zip(scenes, structures, strict=True)
+        ]
+        alike = [len(given) > 1 and np.linalg.matrix_rank(given) < len(given) for given in rows]
+        assert sum(alike) > 60
+        touching = [
+            isinstance(c, mp.UnilateralContact) and c.gap + float(c.direction @ s.displacement) == 0
+            for s in scenes
+            for c in s.model.contacts
+        ]
+        assert sum(touching) > 60
+        assert {type(c) for s in scenes for c in s.model.contacts} == {mp.UnilateralContact, mp.Friction, mp.ForceLaw}
+
+    @pytest.mark.parametrize(
+        ("answer", "told"),
+        [
+            ("contact_force", lambda force: lambda *given, **named: 1.0001 * force(*given, **named)),
+            ("acceleration", lambda motion: lambda *given, **named: 1.0001 * motion(*given, **named)),
+        ],
+    )
+    def test_judges_by_the_laws(self, monkeypatch, answer, told):
+        number = next(k for k in range(9) if campaign_judge.native(scene_of("lattice", k)).events > 2)
+        assert judged("lattice", number)[0] == [("ok", "")]
+        monkeypatch.setattr(mp.Trajectory, answer, told(getattr(mp.Trajectory, answer)))
+        assert ("failure: equation of motion") in [verdict for verdict, _ in judged("lattice", number)[0]]
 
 
 class TestKernels:

@@ -90,6 +90,7 @@ ARRAYS = {
     "body displacement": (lambda a: body(displacement=a), np.ones(N)),
     "body velocity": (lambda a: body(velocity=a), np.ones(N)),
     "sample times": (lambda a: mp.Sampled(a, np.ones(N)), np.arange(N)),
+    "record values": (lambda a: mp.Accelerogram(np.arange(N), a), np.ones(N)),
     "sample values": (lambda a: mp.Sampled(np.arange(N), a), np.ones(N)),
     "load samples": (lambda a: mp.SampledLoad("tip", np.arange(N), a), np.ones(N)),
 }
@@ -260,6 +261,9 @@ def test_what_is_negative_is_refused(argument):
         (lambda x: mp.StopMotion(x, mp.Harmonic(1.0, 1.0)), ""),
         (lambda x: mp.BaseMotion("tip", x), mp.Sampled([0.0, 1.0], [0.0, 1.0])),
         (lambda x: mp.BaseMotion("tip", x), 3.0),
+        (lambda x: mp.Accelerogram([0.0, 1.0], [0.0, 1.0], x), "g"),
+        (lambda x: mp.Accelerogram([0.0, 1.0], [0.0, 1.0], x), math.nan),
+        (lambda x: mp.Accelerogram([0.0, 1.0], x), [0.0]),
         (lambda x: mp.BaseMotion("tip", mp.Harmonic(1.0, 1.0), x), "stop"),
         (lambda x: mp.BaseMotion("tip", mp.Harmonic(1.0, 1.0), x), None),
         (lambda x: mp.BaseMotion("tip", mp.Harmonic(1.0, 1.0), x), [3]),

@@ -16,6 +16,7 @@ from multiphi_exudyn import exudyn_plugin
 RESULTS = {  # handed out, never made by a user: what they hold stands under Attributes
     "Assembly",
     "BodyHistories",
+    "CondensedStructure",
     "Equilibrium",
     "Event",
     "FrequencyResponse",

@@ -23,7 +23,7 @@ def structure(kind=np.asarray, **changes):
 
 class TestPoints:
     def test_are_found_by_node_and_component(self):
-        found = structure(points={"tip": (7, "uz"), "same": (7, 3), "side": (9, "ux"), "index": 0})
+        found = structure(points={"tip": (7, "uz"), "same": (7, 3), "side": (9, "ux"), "row": np.arange(N) == 0})
         assert [int(np.flatnonzero(found.row(name))[0]) for name in found.points] == [3, 3, 4, 0]
 
     def test_a_table_may_be_an_array(self):
@@ -41,6 +41,8 @@ class TestPoints:
             ((7, "uzz"), "points['tip']: got component 'uzz', need 1 to 6 or one of: ux, uy, uz, rx, ry, rz; did you"),
             ((7, 0), "points['tip']: got component 0, need 1 to 6"),
             ((7, None), "points['tip']: got component None, need 1 to 6"),
+            (7, "points['tip']: got 7, need (node, component), as (7, 'uz'): the rows have nodes"),
+            (0, "points['tip']: got 0, need (node, component)"),
         ],
     )
     def test_refuses(self, refused, place, begins):
@@ -78,7 +80,7 @@ class TestTable:
 class TestFixed:
     @pytest.mark.parametrize("kind", KINDS)
     def test_matrices_points_and_table_keep_their_numbering(self, kind):
-        points = {"index": 5, "node": (7, "uz"), "row": np.arange(N)}
+        points = {"number": (9, 3), "node": (7, "uz"), "row": np.arange(N)}
         found = structure(KINDS[kind], damping=KINDS[kind](STIFFNESS), points=points, fixed=[(1, "all"), (7, "ux")])
         free = [3, 4, 5]
         assert_array_equal(found.free, free)
@@ -101,7 +103,7 @@ class TestFixed:
 
     def test_is_what_ties_to_the_ground_are(self):
         held = structure(fixed=[(1, "ux"), (7, "uz")])
-        tied = assemble({"a": structure(points={"p": 0, "q": 3})}, ties=[{"a.p": 1.0}, {"a.q": 1.0}])
+        tied = assemble({"a": structure(points={"p": (1, "ux"), "q": (7, "uz")})}, ties=[{"a.p": 1.0}, {"a.q": 1.0}])
         assert_array_equal(held.free, tied.free)
         assert_array_equal(held.stiffness, tied.stiffness)
 

@@ -10,6 +10,7 @@ import scipy.io
 import scipy.sparse
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
 
 from multiphi_exudyn import MultiPhiError, MultiPhiModel, MultiPhiTypeError, MultiPhiValueError, read_structure
 from multiphi_exudyn.mechanics.files.matrix_files import read_array
@@ -54,6 +55,17 @@ def mass(tmp_path):
 
 
 class TestMatrices:
+    @pytest.mark.parametrize("triangle", ["lower", "upper", "both"])
+    @pytest.mark.parametrize("name", ["k.mtx", "k.mtx.gz"])
+    def test_of_a_banner_that_says_symmetric_are_not_doubled(self, tmp_path, triangle, name):
+        matrix = STIFFNESS.toarray()
+        kept = {"lower": np.tril(matrix), "upper": np.triu(matrix), "both": matrix}[triangle]
+        places = np.argwhere(kept)
+        entries = "".join(f"{i + 1} {j + 1} {kept[i, j]}\n" for i, j in places.tolist())
+        text = HEADER + f"real Symmetric\n% by hand\n{N} {N} {len(places)}\n{entries}".encode()
+        (tmp_path / name).write_bytes(gzip.compress(text, mtime=0) if name.endswith(".gz") else text)
+        assert_array_equal(read_array("stiffness", tmp_path / name).toarray(), matrix)
+
     @pytest.mark.parametrize("ending", ENDINGS)
     def test_are_those_that_were_written(self, tmp_path, ending):
         files = [write(tmp_path / f"{name}{ending}", a) for name, a in (("mass", MASS), ("stiffness", STIFFNESS))]
@@ -161,6 +173,27 @@ class TestSeveralArrays:
         np.testing.assert_array_equal(found.mass, MASS.toarray())
         np.testing.assert_array_equal(found.stiffness.toarray(), STIFFNESS.toarray())
 
+    @pytest.mark.parametrize("version", ["7", "7.3"])
+    def test_of_matlab_structs_are_their_fields(self, tmp_path, version):
+        file, fields = tmp_path / "model.mat", {"M": MASS.toarray(), "K": STIFFNESS, "name": "boom"}
+        if version == "7":
+            scipy.io.savemat(file, {"model": {"beam": fields, "other": np.eye(2)}, "title": "a structure"})
+        else:
+            arrays = {f"model/beam/{name}": fields[name] for name in "MK"}
+            write_mat_73(file, arrays | {"model/other": np.eye(2)})
+        for files in ((file, file), ((file, "model.beam.M"), (file, "model.beam.K"))):
+            if version == "7.3" and files[1] == file:
+                continue  # another stiffness stands in a further struct
+            found = read_structure(*files)
+            np.testing.assert_array_equal(found.mass, MASS.toarray())
+            assert_array_equal(found.stiffness.toarray(), STIFFNESS.toarray())
+        with pytest.raises(MultiPhiValueError, match=r"no array 'model.M', need one of: model.beam.M, "):
+            read_structure((file, "model.M"), (file, "model.beam.K"))
+
+    def test_of_a_file_without_any_are_refused(self, tmp_path, mass):
+        scipy.io.savemat(tmp_path / "k.mat", {"title": "a structure", "model": {"name": "boom"}})
+        assert "it holds no array of numbers" in refusal(mass, tmp_path / "k.mat")
+
     @pytest.mark.parametrize(
         ("package", "ending", "told"),
         [("h5py", ".mat", "pip install 'multiphi-exudyn.matlab.'"), ("pyyeti", ".op4", "multiphi-exudyn.nastran.'")],
@@ -182,6 +215,14 @@ class TestSeveralArrays:
     ("name", "told"),
     [
         ("k.full", "an Ansys .full file: write its matrices by HBMAT"),
+        ("k.rst", "ansys-mapdl-reader: rst = reader.read_binary"),
+        ("k.unv", r"pyuff: sets = pyuff.UFF\(file\).read_sets\(\); structure_from_modes"),
+        ("k.UFF", "pyuff"),
+        ("k.frd", "SOLVER=MATRIXSTORAGE writes .sti and .mas"),
+        ("k.med", r"EXTR_MATR\(sparse=True\)"),
+        ("k.pch", "pyyeti.nastran.bulk.rddmig"),
+        ("k.h5", "h5py.File"),
+        ("k.csv", r"LinearStructure\(numpy.loadtxt"),
         ("k.OP2", "Nastran results: write the matrices by OUTPUT4"),
         ("k.inp", r"\*MATRIX OUTPUT write .mtx\), need a file that ends in .mtx, "),
     ],
@@ -245,3 +286,11 @@ def test_reading_output4_leaves_how_numbers_are_printed(tmp_path):
     )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert told.strip() == str(1 / 3)
+
+
+def test_what_exudyn_saves_names_the_function_that_takes_it(tmp_path):
+    fem = pytest.importorskip("exudyn.FEM").FEMinterface()
+    fem.nodes = {"Position": np.zeros((2, 3))}
+    fem.massMatrix = fem.stiffnessMatrix = scipy.sparse.eye_array(6, format="csr")
+    fem.SaveToFile(str(tmp_path / "fem"))
+    assert "linear_structure_from_fem(fem" in refusal(tmp_path / "fem.npz", tmp_path / "fem.npz")

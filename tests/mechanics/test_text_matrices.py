@@ -84,9 +84,12 @@ class TestAbaqus:
         assert_array_equal(found.mass.diagonal(), np.diag(MASS)[::-1][order])
         assert_array_equal(found.row("tip"), [0, 1, 0, 0])
 
-    def test_a_node_without_mass_is_named(self, saved, refused):
+    def test_a_node_without_mass_follows_statically(self, saved):
         files = saved("j_MASS1.mtx", nodal(MASS * (np.arange(N) != 3))), saved("j_STIF1.mtx", nodal(STIFFNESS))
-        refused(ValueError, "mass: diagonal entry 5 (uz of node 10) is 0", read_structure, *files)
+        found = read_structure(*files, points={"follows": (10, "uz")})
+        assert_array_equal(found.massless, [5])
+        assert found.dofs.rows[5] == (10, "uz")
+        assert_allclose(found.row("follows"), [0, 0, 1 / 3, 0, 1 / 3, 1], rtol=1e-12)  # between ux of nodes 10 and 7
 
     def test_files_with_and_without_nodes_do_not_mix(self, saved, refused):
         files = saved("j_MASS1.mtx", coordinate(MASS)), saved("j_STIF1.mtx", nodal(STIFFNESS))
@@ -115,6 +118,52 @@ class TestAbaqus:
             read_array("stiffness", saved("job_STIF1.mtx", text))
         assert cause in str(caught.value)
         assert "\n" not in str(caught.value)
+
+
+class TestWithoutBanner:
+    """Matrix Market files that lack their first line begin with "rows columns entries"."""
+
+    @pytest.mark.parametrize("triangle", ["whole", "lower", "upper"])
+    @pytest.mark.parametrize("comments", ["", "% by hand\n%\n"])
+    @pytest.mark.parametrize("matrix", [MASS, STIFFNESS, np.eye(7), np.ones((3, 3)) + np.eye(3)])
+    def test_the_size_is_no_entry(self, saved, triangle, comments, matrix):
+        text = coordinate(matrix, triangle)
+        size = f"{len(matrix)} {len(matrix)} {len(text.splitlines())}\n"
+        assert_array_equal(read_array("mass", saved("m.mtx", comments + size + text)).toarray(), matrix)
+
+    @pytest.mark.parametrize("value", ["5", "6", "5.0", "6.0"])
+    def test_an_entry_that_looks_like_a_size_is_an_entry(self, saved, value):
+        lines = [f"{N} {N} {value}", *(f"{i} {i} {i}" for i in range(N - 1, 0, -1))]
+        found = read_array("mass", saved("m.mtx", "\n".join(lines)))
+        assert_array_equal(found.toarray(), np.diag([*range(1, N), float(value)]))
+
+    @pytest.mark.parametrize("entries", [N - 1, N + 1])
+    def test_a_size_that_does_not_fit_is_refused(self, saved, entries):
+        text = f"{N} {N} {entries}\n" + coordinate(MASS)
+        with pytest.raises(
+            MultiPhiError, match=r"its first line reads '6 6 \d', which is no size, as 6 entries follow"
+        ):
+            read_array("mass", saved("m.mtx", text))
+
+
+class TestSubstructures:
+    def text(self):
+        lower = [[f"{value:.1E}" for value in row[: i + 1]] for i, row in enumerate(STIFFNESS.tolist())]
+        stiffness = ",\n".join(", ".join(row) for row in lower)
+        mass = ", ".join(f"{MASS[i, j]}" for i in range(N) for j in range(i + 1))
+        head = "** ABAQUS\n*USER ELEMENT, NODES=2, LINEAR\n1, 2, 3\n"
+        return f"{head}*MATRIX,TYPE=STIFFNESS\n{stiffness}\n*matrix, type=mass\n{mass}\n"
+
+    def test_of_abaqus_hold_both_matrices(self, saved):
+        file = saved("sub.mtx", self.text())
+        found = read_structure(file, file, points={"tip": 5})
+        assert_array_equal(found.mass, MASS)
+        assert_array_equal(found.stiffness, STIFFNESS)
+
+    def test_that_end_early_are_refused(self, saved):
+        file = saved("sub.mtx", self.text().rstrip(" \n0123456789."))
+        with pytest.raises(MultiPhiError, match="mass matrix has 20 numbers, which are no triangle"):
+            read_structure(file, file)
 
 
 class TestTables:

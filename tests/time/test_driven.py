@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.interpolate
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from integrated import integrated
@@ -103,6 +104,34 @@ class TestContactsUnderLoads:
             lambda t: np.ones(3) * 0.1 * rate**2 * math.sin(rate * t),
             lambda t, i: -0.1 * math.sin(rate * t) if i == 0 else 0.0,
         )
+
+    @pytest.mark.parametrize("stays", [False, True])
+    def test_base_with_an_accelerogram(self, stays):
+        """A record in g from before the run until its middle; the base then moves on, and a stop may not follow it."""
+        time = np.linspace(-0.5, 6.0, 27)
+        values = 0.3 * np.sin(3 * time)
+        course = mp.Accelerogram(time, values, factor=9.81)
+        moved = scipy.interpolate.make_interp_spline(time, 9.81 * values, k=1).antiderivative(2)
+        rate = moved.derivative()
+
+        def way(t):
+            return float(moved(min(t, 6.0)) + max(t - 6.0, 0.0) * rate(6.0))
+
+        assert_allclose(course.displacement(TIMES), [way(t) for t in TIMES], rtol=1e-12, atol=1e-14)
+        self.check(
+            [mp.BaseMotion(np.ones(3), course, fixed_stops=("below",) if stays else ())],
+            lambda t: -np.ones(3) * np.interp(t, time, 9.81 * values, 0.0, 0.0),
+            lambda t, i: -way(t) if i == 0 and stays else 0.0,
+        )
+
+    def test_an_accelerogram_is_a_force_on_every_mass(self):
+        time, values = np.linspace(0.3, 4.0, 40), np.random.default_rng(3).normal(size=40)
+        structure = chain(3, damping=DAMPING, stiffness=10.0)
+        model = mp.MultiPhiModel(structure, [mp.UnilateralContact("below", "m2", 0.05, 300.0)], modes="all")
+        base = mp.BaseMotion(np.ones(3), mp.Accelerogram(time, values, factor=0.01))
+        force = mp.SampledLoad(-structure.mass @ np.ones(3), time, 0.01 * values)
+        first, second = (mp.simulate(model, 8.0, loads=[load]) for load in (base, force))
+        assert_allclose(first.displacement(TIMES[:41]), second.displacement(TIMES[:41]), rtol=1e-12, atol=1e-14)
 
     @pytest.mark.parametrize("law", ["linear", "logarithmic"])
     def test_base_that_sweeps(self, law):

@@ -10,6 +10,7 @@ from slow_mass import free_mass
 import multiphi_exudyn as mp
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
+from multiphi_exudyn.study.stability.law_check import broken_laws
 from multiphi_exudyn.study.stability.run_laws import complaints
 
 RATES = [1e-14, 1e-11, 4e-8, 1e-6, 1e-4, 1e-2, 1.0, 100.0]  # 1/s
@@ -70,6 +71,22 @@ class TestFreeMass:
         stop = mp.UnilateralContact("stop", {"m": -1.0}, gap=free_mass(rate, 7.0, 1.0, 0.0)[0])
         run = mp.simulate(mass(rate, [stop]), 10.0, velocity=[1.0])
         assert abs(run.events[0].time - 7.0) <= 1e-13 * 10
+
+
+class TestReaction:
+    @pytest.mark.parametrize("rate", RATES)
+    @pytest.mark.parametrize("parts", [(0.0, 1.0), (0.3, 0.8)])
+    def test_impulse_of_a_floor_that_a_dashpot_presses_on_is_that_of_the_momentum(self, rate, parts):
+        """Free masses slide on a floor y = 0, an oblique dashpot presses on it: int lambda = sum c_yi x_i."""
+        row = np.array([1.0, 4.0, -10.0, 10.0])
+        damping = rate / 200 * np.outer(row, row)
+        body = mp.LinearStructure(np.eye(4), np.zeros((4, 4)), damping, {"y": 3})
+        model = mp.MultiPhiModel(body, [mp.UnilateralContact("floor", "y", 0.0)])
+        run = mp.simulate(model, 10.0, velocity=[2.0, 0.0, -1.0, 0.0])
+        first, last = 10.0 * np.array(parts)
+        expected = damping[3] @ (run.displacement(last) - run.displacement(first))
+        assert_allclose(run.contact_impulse("floor", first, last), expected, rtol=1e-9, atol=1e-12 * damping[3, 3])
+        assert broken_laws(run) == []
 
 
 class TestChain:

@@ -123,7 +123,14 @@ class LoadedLevel(Shown):
         return replace(kept, excitation=excitation)
 
     def _under(self, excitation: Excitation) -> LoadedLevel:
-        channels, equilibrium = Channels.of(self.level, excitation), self.asymptotic
+        equilibrium, gaps, acting = self.asymptotic, self.gap_constants, excitation
+        if excitation.steady >= 0 and np.any(self.pushes):
+            equilibrium = self.level.asymptotic(excitation.static)
+            gaps = equilibrium.gaps
+            patterns = excitation.patterns.copy()
+            patterns[:, excitation.steady] += self._push
+            acting = replace(excitation, patterns=patterns)
+        channels = Channels.of(self.level, acting)
         if excitation.steady >= 0:
             force = channels.force.copy()
             force[:, excitation.steady] += equilibrium.drive
@@ -132,7 +139,7 @@ class LoadedLevel(Shown):
         return LoadedLevel(
             level=channels.extended(self.level, excitation.stops),
             asymptotic=equilibrium,
-            gap_constants=self.gap_constants,
+            gap_constants=gaps,
             excitation=excitation,
             channels=channels,
             static=self,
@@ -174,6 +181,11 @@ class LoadedLevel(Shown):
         base = self.level.base
         given = [pushed[state] for pushed, state in zip(base.pushes_of_states, self.states, strict=True)]
         return np.array([*given, *[0.0] * (len(base.links) - len(given))])
+
+    @property
+    def _push(self) -> np.ndarray:
+        """Load (m,) of the constant forces of its elements."""
+        return np.asarray(self.level.base.directions @ self.pushes)
 
     @functools.cached_property
     def driven(self) -> bool:
@@ -246,6 +258,8 @@ class LoadedLevel(Shown):
         modal = -self.alone.asymptotic.drive
         if base.general:
             modal += self.modal.vectors.T @ (equilibrium.load - static)  # constant forces of elements
+            if self.excitation.steady >= 0:  # they are on its channel, and so is what they drive
+                modal += np.where(self.modal.squares, 0.0, self.modal.vectors.T @ self._push)
         constant = equilibrium.strain + self.stored - float(static @ y)
         if not q:
             return PotentialForm(constant, modal, self.modal.squares, np.zeros((0, r)), self.follows)

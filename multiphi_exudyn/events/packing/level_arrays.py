@@ -29,6 +29,7 @@ from multiphi_exudyn.events.transitions.exit_table import ExitTable
 from multiphi_exudyn.events.transitions.exits import after, entered_row, entering_exit, exits_of
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.transitions.transition import Transition
+from multiphi_exudyn.mathematics.blas_threads import one_blas_thread
 
 __all__ = ["LevelArrays"]
 
@@ -210,6 +211,7 @@ class LevelArrays:
         """Empty the tables, so that every level and map is changed before it is used again."""
         self._tables.clear()
 
+    @one_blas_thread()
     def supply(self) -> None:
         """Pack what the loop needs."""
         key = self.ints[self.ints[a.NEEDED_KEY] :][: self.ints[a.ELEMENTS]].tolist()

@@ -7,7 +7,6 @@ samples: levels with the first, a middle or the last contact closed alone, and o
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,7 +21,7 @@ from multiphi_exudyn.mechanics.structures.arguments import Matrix
 from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.structures.structure import LinearStructure
 
-__all__ = ["build_base"]
+__all__ = ["COMPLETE", "build_base"]
 
 BEYOND = 8  # modes of an incomplete base beyond those of a level
 COMPLETE = 600  # DoFs up to which the base holds every mode; above, the lowest ones and Krylov vectors
@@ -78,15 +77,8 @@ def _incomplete_base_modes(
 ) -> LowestModes:
     """Return the lowest modes and the Krylov vectors of ``rows`` (k, n)."""
     count = min(structure.n - 2, modes + BEYOND)
-    known_modes = None if previous is None or previous.complete else _structure_modes(previous)
+    known_modes = None if previous is None or previous.complete else previous.structure_modes
     return lowest_modes(structure.mass, structure.stiffness, count, rows, samples, known_modes, least=min(modes, count))
-
-
-def _structure_modes(base: ModalBase) -> Modes:
-    """Return those modes of a base that are modes of the structure."""
-    return dataclasses.replace(
-        base.modes, omega=base.modes.omega[: base.exact_count], shapes=base.modes.shapes[:, : base.exact_count]
-    )
 
 
 def _sample_levels(stiffness: np.ndarray, modes: int) -> list[HeldRows]:

@@ -12,6 +12,7 @@ Krylov vectors of contacts and points (build_base.py). A set of closed contacts 
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import math
 from collections.abc import Iterator, Sequence
@@ -67,6 +68,12 @@ class ModalBase(ElementTable, Shown):
     def _facts(self) -> Iterator[tuple[str, str]]:
         yield "coordinates", f"{self.modes.count} of {len(self.modes.shapes)}"
         yield "contacts", names([contact.name for contact in self.contacts])
+
+    @property
+    def structure_modes(self) -> Modes:
+        """Those modes that are modes of the structure."""
+        omega, shapes = self.modes.omega[: self.exact_count], self.modes.shapes[:, : self.exact_count]
+        return dataclasses.replace(self.modes, omega=omega, shapes=shapes)
 
     def coordinates(self, x: np.ndarray) -> np.ndarray:
         """Return y = Phi^T M x (m,) or (m, k) of configurations (n,) or (n, k), with zeros in place of round-off.

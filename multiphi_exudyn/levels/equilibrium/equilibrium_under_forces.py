@@ -8,18 +8,18 @@ A structure without supports has no equilibrium position, but a deformation. Und
 
     y_e = Omega_e^-2 f_e,   y_0 = 0,   f_0 = 0
 
-x is then M-orthogonal to the rigid-body modes. Unbalanced forces accelerate the structure: f - M Phi_0 f_0 deforms it
-(inertia relief), and y_e is the same. Its contacts have to stay open: the position in which they would carry it is not
-determined.
+x is then M-orthogonal to the rigid-body modes, and its contacts have to stay open. Unbalanced forces either accelerate
+the structure: f - M Phi_0 f_0 deforms it (inertia relief), and y_e is the same. Or they press it on its contacts
+(equilibrium_on_contacts.py).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.levels.base.modal_base import ModalBase
+from multiphi_exudyn.levels.equilibrium.equilibrium_on_contacts import equilibrium_on_contacts
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import equilibrium_along_path
 from multiphi_exudyn.levels.level.build_level import build_level
 from multiphi_exudyn.mathematics.complementarity.least_distance import Infeasible, least_distance
@@ -41,7 +41,10 @@ def equilibrium_under_forces(
                 f"static equilibrium: the structure is free ({base.modes.rigid} rigid-body modes) and has force laws "
                 "or friction, need supports that hold it"
             )
-        return _free_deformation(base, load, size, inertia_relief), np.zeros(len(base.contacts))
+        unbalanced = _unbalanced(base, load, size)
+        if unbalanced > BALANCED and not inertia_relief:
+            return equilibrium_on_contacts(base, load, unbalanced), np.zeros(len(base.contacts))
+        return _free_deformation(base, load), np.zeros(len(base.contacts))
     if base.laws or base.general:
         return equilibrium_along_path(base, load)
     compliance = base.modes.omega**-2.0
@@ -52,27 +55,28 @@ def equilibrium_under_forces(
     return level.asymptotic(load).configuration, np.zeros(len(base.contacts))
 
 
-def _free_deformation(base: ModalBase, load: np.ndarray, size: np.ndarray, inertia_relief: bool) -> np.ndarray:
+def _unbalanced(base: ModalBase, load: np.ndarray, size: np.ndarray) -> float:
+    """Return the largest share of a load (m,) on a rigid-body mode that is not balanced; size: (m,) of its terms."""
+    free = slice(base.modes.rigid)
+    return float(
+        np.max(np.divide(np.abs(load[free]), size[free], out=np.zeros(base.modes.rigid), where=size[free] > 0))
+    )
+
+
+def _free_deformation(base: ModalBase, load: np.ndarray) -> np.ndarray:
     """Return the deformation y (m,) of a structure without supports under a load (m,).
 
-    size: (m,) sum of the absolute values of the terms of the load. Raises MultiPhiValueError for an unbalanced load
-    without inertia relief, and where the deformation closes a contact.
+    Raises MultiPhiValueError where the deformation closes a contact.
     """
-    free, elastic = slice(base.modes.rigid), slice(base.modes.rigid, None)
-    unbalanced = np.divide(np.abs(load[free]), size[free], out=np.zeros(base.modes.rigid), where=size[free] > 0)
-    refusal = f"static equilibrium: the structure is free ({base.modes.rigid} rigid-body modes)"
-    if not inertia_relief and np.max(unbalanced) > BALANCED:
-        raise MultiPhiValueError(
-            f"{refusal} and {per_cent(float(np.max(unbalanced)))} of the forces are not balanced, need balanced "
-            "forces, supports, or inertia_relief=True (the deformation while the forces accelerate the structure)"
-        )
+    elastic = slice(base.modes.rigid, None)
     y = np.zeros(base.modes.count)
     y[elastic] = load[elastic] / base.modes.omega[elastic] ** 2
     terms = np.abs(base.directions.T) @ np.abs(y) + np.abs(base.gaps)
     pressed = np.flatnonzero(drop_round_off(base.directions.T @ y + base.gaps, terms) < 0)
     if len(pressed):
         raise MultiPhiValueError(
-            f"{refusal} and would press on {base.links[int(pressed[0])].name!r}, need a gap there, or supports"
+            f"static equilibrium: the structure is free ({base.modes.rigid} rigid-body modes) and would press on "
+            f"{base.links[int(pressed[0])].name!r}, need a gap there, or supports"
         )
     return y
 

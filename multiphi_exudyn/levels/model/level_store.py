@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
 
-from multiphi_exudyn.levels.base.build_base import build_base
+from multiphi_exudyn.levels.base.build_base import COMPLETE, build_base
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.level.build_level import build_level
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.model.mode_choice import FIRST
+from multiphi_exudyn.mathematics.blas_threads import one_blas_thread
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.eigenproblems.lowest_modes import missing_flexibility
 from multiphi_exudyn.mechanics.elements.element import Element
@@ -52,7 +54,9 @@ class LevelStore:
     def built_base(self, modes: int | None) -> ModalBase:
         """Return the base, built on first use for levels with so many modes, None for all."""
         if self.base is None:
-            self.base = build_base(self.structure, self.contacts, modes or "all", self._previous_base, self.load_rows)
+            given = self.structure, self.contacts, modes or "all", self._previous_base, self.load_rows
+            with one_blas_thread() if self.structure.n <= COMPLETE else nullcontext():
+                self.base = build_base(*given)
             self._previous_base = None
         return self.base
 

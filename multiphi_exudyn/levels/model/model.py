@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.display import Shown, names
-from multiphi_exudyn.errors import MultiPhiTypeError
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiWarning
+from multiphi_exudyn.levels.base.stiffness_warnings import stiffness_warnings
 from multiphi_exudyn.levels.equilibrium.equilibrium_under_forces import equilibrium_under_forces
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.level.level import Level
@@ -31,6 +33,7 @@ from multiphi_exudyn.mechanics.structures.structure import LinearStructure
 
 __all__ = ["MultiPhiModel"]
 
+CALLER = 3  # level of the stack: the line that asks for an equilibrium
 WIDER = 2  # cached models with a base for other loads, each with n numbers for every coordinate
 ENTRIES = 64  # cached results that other modules derive from a model, such as sentences on its levels
 LOADS = 16  # cached sets of levels under loads, one for each key; static loads have two
@@ -246,16 +249,18 @@ class MultiPhiModel(SharedBase, Shown):
         forces : mapping of str to float
             Point to force [N], along the point's positive displacement.
         inertia_relief : bool, default False
-            For a structure with rigid-body modes: whether the forces may accelerate it; with False they have to balance
-            each other. The result is its deformation, M-orthogonal to those modes.
+            For a structure with rigid-body modes: whether the forces may accelerate it; the result is its deformation,
+            M-orthogonal to those modes. With False they have to balance each other, or its contacts have to carry them:
+            then it rests on these, without moving in directions that neither forces nor contacts determine.
 
         Raises
         ------
         MultiPhiTypeError
             For forces that are no mapping.
         MultiPhiValueError
-            For a structure with rigid-body modes under unbalanced forces, with force laws or friction, or with contacts
-            that close; for rigid contacts that exclude each other, and for unknown points.
+            For a structure with rigid-body modes under unbalanced forces that its contacts cannot carry, under balanced
+            ones that press it on contacts, or with force laws or friction; for rigid contacts that exclude each other,
+            and for unknown points.
         NumericalFailure
             Where the structure snaps through on the way, friction slips with a jump, or contacts wedge.
 
@@ -284,8 +289,15 @@ class MultiPhiModel(SharedBase, Shown):
     def _equilibrium(self, forces: Mapping[str, float], inertia_relief: bool) -> tuple[np.ndarray, np.ndarray]:
         """Return y (m,) and the stretches (l,) [m] of links in equilibrium under forces at points."""
         base, load = self.base, self._force_row(forces)
+        if base.modes.rigid:
+            for sentence in self.stiffness_warnings():
+                warnings.warn(sentence, MultiPhiWarning, CALLER)
         size = np.abs(base.modes.shapes.T) @ np.abs(load)
         return equilibrium_under_forces(base, base.modes.shapes.T @ load, size, inertia_relief)
+
+    def stiffness_warnings(self) -> tuple[str, ...]:
+        """Return warnings of what the digits of the stiffness leave open of the structure's modes."""
+        return tuple(stiffness_warnings(self.structure.stiffness, self.base.structure_modes))
 
     def base_load(self, forces: Mapping[str, float]) -> np.ndarray:
         """Return forces [N] at points as a load (m,) in base coordinates."""

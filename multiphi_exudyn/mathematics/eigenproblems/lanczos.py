@@ -8,7 +8,8 @@ import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 
-from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.errors import NumericalFailure
+from multiphi_exudyn.mathematics.eigenproblems.massless_motions import not_definite
 from multiphi_exudyn.mathematics.eigenproblems.modes import NEAR, ROUND_OFF
 
 __all__ = ["check_mass", "definite_factor", "lanczos", "lanczos_iteration"]
@@ -31,9 +32,10 @@ def definite_factor(matrix: Any) -> Any | None:
 
 
 def check_mass(mass: Any) -> None:
+    """Raise MultiPhiValueError for a sparse mass that is not positive definite."""
     diagonal = scipy.sparse.diags_array(mass.diagonal())
     if (mass != diagonal).nnz and definite_factor(mass) is None:
-        raise MultiPhiValueError("mass: indefinite, need a positive definite matrix")
+        raise not_definite(mass)
 
 
 def lanczos(

@@ -30,12 +30,11 @@ from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.mathematics.eigenproblems.inner_products import Vectors, orthonormal_complement, ritz
 from multiphi_exudyn.mathematics.eigenproblems.lanczos import check_mass, definite_factor, lanczos, lanczos_iteration
 from multiphi_exudyn.mathematics.eigenproblems.modes import (
-    FIRST_SHIFT,
     NEAR,
     Modes,
-    largest_ratio,
+    first_shift,
     modes_from_squares,
-    round_off_energy,
+    rigid_modes,
 )
 
 __all__ = ["ACCURATE", "HeldRows", "LowestModes", "lowest_modes", "missing_flexibility"]
@@ -139,13 +138,13 @@ class _Lowest:
             return
         if self._factor is not None:
             self._find(count)
-        if self._factor is None or np.any(self.values <= round_off_energy(self.stiffness, self.vectors)):
+        if self._factor is None or np.any(rigid_modes(self.stiffness, self.values, self.vectors)):
             self._find_with_rigid_ones(count)
 
     def _find_with_rigid_ones(self, count: int) -> None:
-        self._set_shift(FIRST_SHIFT * largest_ratio(self.mass, self.stiffness))
+        self._set_shift(first_shift(self.mass, self.stiffness))
         self._find_anew(count)
-        elastic = self.values > round_off_energy(self.stiffness, self.vectors)
+        elastic = ~rigid_modes(self.stiffness, self.values, self.vectors)
         if np.any(elastic):
             self._set_shift(float(np.min(self.values[elastic])))
             self._find_anew(count)

@@ -24,10 +24,16 @@ import scipy.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
+from multiphi_exudyn.mathematics.eigenproblems.massless_motions import not_definite
+from multiphi_exudyn.mathematics.eigenproblems.stiffness_digits import (
+    digits_of,
+    doubled_product,
+    energy_noise,
+    is_exact,
+)
 from multiphi_exudyn.mathematics.orthonormal import scalar_product
 
 __all__ = [
-    "FIRST_SHIFT",
     "NEAR",
     "ROUND_OFF",
     "Modes",
@@ -36,15 +42,23 @@ __all__ = [
     "aligned_modes",
     "cluster_end",
     "complete_modes",
+    "first_shift",
     "has_clusters",
-    "largest_ratio",
     "modes_from_squares",
     "right_singular_vectors",
+    "rigid_modes",
     "round_off_energy",
 ]
 
 ROUND_OFF = 64 * np.finfo(float).eps  # of |phi|^T |K| |phi|: strain energy below it is round-off, not stiffness
 FIRST_SHIFT = 1e-8  # of the largest K_ii / M_ii: regularises K until the first elastic mode is known
+FEW_DIGITS_SHIFT = 1e-6  # the same for K of fewer than 53 bits
+FEWEST_DIGITS = 1e-5  # of |phi|^T |K| |phi|: more than the digits of any K that can be told leave unknown
+FAR = 0.05  # of the first elastic omega^2: what the digits leave open of rigid-body modes is at most this
+NO_ENERGY = 1e-9  # of ROUND_OFF: exact strain energy of a rigid-body mode, which is round-off of its shape, squared
+SOFT = 1e-10  # round-off of omega^2 above which a mode is soft beside its strain energies
+ALONE = 0.5  # of omega^2 of the next mode: soft modes up to such a gap are made exact together
+REFINEMENTS = 3  # each squares the error that other modes leave in soft ones
 EQUAL = 1e-11  # of omega^2: nearer ones are equal up to the round-off of matrices and eigenvalues
 NEAR = 1e-6  # of omega^2: round-off mixes nearer modes by more than 1e-10, so they are kept together
 MOVES = 1e-5  # of the largest value of a row: of smaller values, round-off could choose the sign of a mode
@@ -79,19 +93,70 @@ def complete_modes(mass: np.ndarray, stiffness: np.ndarray) -> Modes:
     """All n modes of dense (n, n) matrices. Raises MultiPhiValueError for an indefinite stiffness."""
     shift = 0.0
     modes = None
-    for attempt in (0.0, FIRST_SHIFT * largest_ratio(mass, stiffness)):
+    for attempt in (0.0, first_shift(mass, stiffness)):
         shift = attempt
         modes = _shifted_modes(mass, stiffness, shift)
         if modes is not None and (shift > 0 or modes.rigid == 0):
             break
     if modes is None:
         lowest = scipy.linalg.eigh(stiffness, mass, eigvals_only=True, subset_by_index=[0, 0])[0]
-        raise MultiPhiValueError(
-            f"stiffness: indefinite, lowest eigenvalue omega^2 = {lowest:g}; need a positive semidefinite matrix"
-        )
+        raise _indefinite(lowest)
     if 0 < modes.rigid < modes.count:
         modes = _shifted_modes(mass, stiffness, modes.omega[modes.rigid] ** 2) or modes
-    return modes
+    return _with_exact_soft_modes(mass, stiffness, modes)
+
+
+def _indefinite(lowest: float) -> MultiPhiValueError:
+    return MultiPhiValueError(
+        f"stiffness: indefinite, lowest eigenvalue omega^2 = {lowest:g}; need a positive semidefinite matrix"
+    )
+
+
+def _with_exact_soft_modes(mass: np.ndarray, stiffness: np.ndarray, modes: Modes) -> Modes:
+    """Return the modes with soft ones, beside stiff springs, to the relative accuracy of the others.
+
+    The factor of K has lost them to round-off of the stiff springs, which a K of exact numbers does not have.
+    """
+    if not is_exact(stiffness):
+        return modes
+    modes = _with_soft_ones_among_rigid(stiffness, modes)
+    squares, energies = modes.omega**2, round_off_energy(stiffness, modes.shapes)
+    count = modes.rigid + int(np.sum(energies[modes.rigid :] > SOFT * squares[modes.rigid :]))
+    while modes.rigid < count < modes.count and squares[count - 1] > ALONE * squares[count]:
+        count += 1
+    if count == modes.rigid:
+        return modes
+    own, further = slice(modes.rigid, count), slice(count, None)
+    shapes = modes.shapes[:, own]
+    for _ in range(REFINEMENTS):
+        forces = modes.shapes.T @ doubled_product(stiffness, shapes)
+        shapes = shapes - modes.shapes[:, further] @ (
+            forces[further] / (squares[further, None] - np.diagonal(forces[own]))
+        )
+        upper = scipy.linalg.cholesky(shapes.T @ (mass @ shapes))
+        shapes = scipy.linalg.solve_triangular(upper, shapes.T, trans="T").T
+    projected = shapes.T @ doubled_product(stiffness, shapes)
+    scales = np.sqrt(np.diagonal(projected))
+    omega, rotation = right_singular_vectors(scipy.linalg.cholesky(projected / np.outer(scales, scales)) * scales)
+    return Modes(
+        np.concatenate([modes.omega[: modes.rigid], omega, modes.omega[further]]),
+        np.hstack([modes.shapes[:, : modes.rigid], shapes @ rotation, modes.shapes[:, further]]),
+        modes.rigid,
+    )
+
+
+def _with_soft_ones_among_rigid(stiffness: np.ndarray, modes: Modes) -> Modes:
+    """Return the modes with a frequency for those without one whose exact strain energy is not zero."""
+    own = modes.shapes[:, : modes.rigid]
+    squares, rotation = scipy.linalg.eigh(own.T @ doubled_product(stiffness, own))
+    highest = float(modes.omega[-1]) ** 2  # of the modes that the round-off of a shape consists of
+    none = NO_ENERGY * max(ROUND_OFF * highest, np.max(round_off_energy(stiffness, own), initial=0.0))
+    if np.any(squares < -none):
+        raise _indefinite(float(squares[0]))
+    soft = squares > none
+    omega, shapes = modes.omega.copy(), modes.shapes.copy()
+    omega[: modes.rigid], shapes[:, : modes.rigid] = np.sqrt(np.where(soft, squares, 0.0)), own @ rotation
+    return Modes(omega, shapes, modes.rigid - int(np.sum(soft)))
 
 
 def right_singular_vectors(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -235,7 +300,7 @@ def _shifted_modes(mass: np.ndarray, stiffness: np.ndarray, shift: float) -> Mod
     try:
         lower = scipy.linalg.cholesky(mass, lower=True)
     except scipy.linalg.LinAlgError as error:
-        raise MultiPhiValueError("mass: indefinite, need a positive definite matrix") from error
+        raise not_definite(mass) from error
     try:
         upper = scipy.linalg.cholesky(stiffness + shift * mass)
     except scipy.linalg.LinAlgError:
@@ -251,10 +316,29 @@ def modes_from_squares(stiffness: Any, omega_squared: np.ndarray, shapes: np.nda
 
     shift: subtracted before to get omega_squared, which has its round-off.
     """
-    rigid = omega_squared <= round_off_energy(stiffness, shapes) + ROUND_OFF * shift
+    rigid = rigid_modes(stiffness, omega_squared, shapes, shift)
     order = np.argsort(np.where(rigid, 0.0, omega_squared), kind="stable")
     omega = np.sqrt(np.where(rigid, 0.0, omega_squared))[order]
     return Modes(omega, np.ascontiguousarray(shapes[:, order]), int(np.sum(rigid)))
+
+
+def rigid_modes(stiffness: Any, squares: np.ndarray, shapes: np.ndarray, shift: float = 0.0) -> np.ndarray:
+    """Return which modes (m,) are rigid-body modes: without strain energy, but for round-off and the digits of K.
+
+    What few digits leave open of omega^2 has to lie far below the first elastic one. squares: omega^2 (m,), with the
+    round-off of ``shift``.
+    """
+    sizes = round_off_energy(stiffness, shapes)
+    rigid = np.asarray(squares <= sizes + ROUND_OFF * shift)
+    digits = digits_of(stiffness)
+    if digits is None:
+        return rigid
+    noise = np.zeros(len(squares))
+    low = np.flatnonzero(squares <= FEWEST_DIGITS / ROUND_OFF * sizes)
+    noise[low] = energy_noise(stiffness, shapes[:, low], digits)
+    without = rigid | (squares <= noise)
+    is_far = np.max(noise[without], initial=0.0) <= FAR * np.min(squares[~without], initial=np.inf)
+    return without if is_far else rigid
 
 
 def round_off_energy(stiffness: Any, shapes: np.ndarray) -> np.ndarray:
@@ -262,5 +346,7 @@ def round_off_energy(stiffness: Any, shapes: np.ndarray) -> np.ndarray:
     return ROUND_OFF * np.einsum("ij,ij->j", magnitudes, abs(stiffness) @ magnitudes)
 
 
-def largest_ratio(mass: Any, stiffness: Any) -> float:
-    return float(np.max(stiffness.diagonal() / mass.diagonal())) or 1.0  # any shift is good for zero stiffness
+def first_shift(mass: Any, stiffness: Any) -> float:
+    """Return the shift s with which K + s M is definite where K is, but for rigid-body modes."""
+    largest = float(np.max(stiffness.diagonal() / mass.diagonal())) or 1.0  # any shift is good for zero stiffness
+    return largest * (FIRST_SHIFT if digits_of(stiffness) is None else FEW_DIGITS_SHIFT)

@@ -128,6 +128,17 @@ class PiecewiseExponential:
         changed = differentiated(self.rates, self.coefficients.T).T
         return PiecewiseExponential(self.breaks, self.rates, changed, self.error * steepest if self.error else 0.0)
 
+    def integral(self, end: float) -> PiecewiseExponential:
+        """The integral of u from the first break on, up to ``end`` at least; of polynomials without carriers."""
+        last = float(self.breaks[-1])
+        breaks = np.append(self.breaks, 2 * end - last) if end > last else self.breaks
+        degrees = np.arange(1, self.coefficients.shape[1] + 1)
+        changed = np.zeros((len(breaks) - 1, len(degrees) + 1), complex)
+        changed[: self.pieces, 1:] = self.coefficients / degrees
+        added = np.sum(changed[: self.pieces, 1:] * np.diff(self.breaks)[:, None] ** degrees, axis=1)
+        changed[1:, 0] = np.cumsum(added)[: len(changed) - 1]
+        return PiecewiseExponential(breaks, np.zeros(len(changed), complex), changed)
+
     def local(self, t: float) -> Piece:
         """What holds from t on."""
         i = int(np.searchsorted(self.breaks, t, side="right")) - 1

@@ -4,8 +4,9 @@
 .mat    MATLAB to version 7 by scipy; version 7.3 is HDF5, for which h5py is needed: the extra ``matlab``
 .op4    Nastran OUTPUT4, text or binary, dense or sparse, by pyYeti: the extra ``nastran``
 
-The array is selected by (file, name). Without a name it is the only array, or among the largest square ones the only
-one with a usual initial: M for mass; K for stiffness; C, D or B for damping.
+A field of a MATLAB struct has the name "model.M". The array is selected by (file, name). Without a name it is the only
+array, or among the largest square ones the only one with a usual initial, variables before fields: M for mass; K for
+stiffness; C, D or B for damping.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from multiphi_exudyn.mechanics.structures.arguments import Matrix, one_of
 __all__ = ["ARRAY_READERS", "npz_arrays", "select_array"]
 
 INITIALS = {"mass": ("m",), "stiffness": ("k", "stif"), "damping": ("c", "d", "b")}
+FEM_INTERFACE = {"massMatrix", "stiffnessMatrix", "nodes"}  # arrays of a file that Exudyn's FEMinterface has saved
 NUMBERS = "biufc"  # numpy's codes of numbers
 HDF5 = b"\x89HDF"
 HDF5_AT = (0, 512)  # offsets in bytes: MATLAB writes 512 bytes before
@@ -31,6 +33,11 @@ HDF5_AT = (0, 512)  # offsets in bytes: MATLAB writes 512 bytes before
 def npz_arrays(path: Path) -> dict[str, Matrix]:
     """All arrays of an .npz file by name; one that ``scipy.sparse.save_npz`` wrote is one sparse matrix, "matrix"."""
     with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+        if set(stored.files) >= FEM_INTERFACE:
+            raise ValueError(
+                "it is a FEMinterface of Exudyn, read by fem = exudyn.FEM.FEMinterface(); fem.LoadFromFile(file); "
+                "structure = multiphi_exudyn.exudyn_plugin.linear_structure_from_fem(fem, fixed=..., points=...)"
+            )
         arrays = dict(stored)
     if "format" not in arrays:
         return arrays
@@ -38,12 +45,25 @@ def npz_arrays(path: Path) -> dict[str, Matrix]:
 
 
 def mat_arrays(path: Path) -> dict[str, Matrix]:
-    """All matrices of numbers in a .mat file by name."""
+    """All matrices of numbers in a .mat file by name, those in structs as "struct.field"."""
     with path.open("rb") as file:
         head = file.read(HDF5_AT[-1] + len(HDF5))
     if any(head[at:].startswith(HDF5) for at in HDF5_AT):
         return _mat_73_arrays(path)
-    return _matrices(scipy.io.loadmat(path, appendmat=False))
+    stored = scipy.io.loadmat(path, appendmat=False)
+    return _matrices(_with_fields({name: item for name, item in stored.items() if not name.startswith("__")}))
+
+
+def _with_fields(items: Mapping[str, Any]) -> dict[str, Any]:
+    """Variables by name, with the fields of single structs in place of these."""
+    found: dict[str, Any] = {}
+    for name, item in items.items():
+        if isinstance(item, np.ndarray) and item.dtype.names and item.size == 1:
+            fields = {f"{name}.{field}": item.ravel()[0][field] for field in item.dtype.names}
+            found |= _with_fields(fields)
+        else:
+            found[name] = item
+    return found
 
 
 def _mat_73_arrays(path: Path) -> dict[str, Matrix]:
@@ -56,16 +76,24 @@ def _mat_73_arrays(path: Path) -> dict[str, Matrix]:
         raise ValueError(needed) from error
     with h5py.File(path, "r") as file:
         variables = {name: item for name, item in file.items() if not name.startswith("#")}
-        arrays = {name: _hdf5_array(item) for name, item in variables.items()}
-    return _matrices(arrays)
+        return _matrices(_hdf5_arrays(variables))
+
+
+def _hdf5_arrays(items: Mapping[str, Any]) -> dict[str, Any]:
+    """Variables of MATLAB 7.3 by name, with the fields of structs, which are groups, in place of these."""
+    found: dict[str, Any] = {}
+    for name, item in items.items():
+        if hasattr(item, "keys") and "MATLAB_sparse" not in item.attrs:
+            found |= _hdf5_arrays({f"{name}.{field}": inner for field, inner in item.items()})
+        else:
+            found[name] = _hdf5_array(item)
+    return found
 
 
 def _hdf5_array(item: Any) -> Any:
-    """A variable of MATLAB 7.3: dense ones are stored by columns, sparse ones as data, ir and jc; None: others."""
+    """A variable of MATLAB 7.3: dense ones are stored by columns, sparse ones as data, ir and jc."""
     if not hasattr(item, "keys"):
         return np.asarray(item).T
-    if "MATLAB_sparse" not in item.attrs:
-        return None
     pointers = np.asarray(item["jc"]).astype(np.int64)
     data, rows = (np.asarray(item[name]) if name in item else np.zeros(0) for name in ("data", "ir"))
     shape = (int(item.attrs["MATLAB_sparse"]), len(pointers) - 1)
@@ -93,10 +121,17 @@ def select_array(name: str, arrays: Mapping[str, Matrix], array_name: str | None
         return next(iter(arrays.values()))
     square = {key: array.shape[0] for key, array in arrays.items() if array.ndim == 2 and len({*array.shape}) == 1}
     candidates = [
-        key for key, n in square.items() if n == max(square.values()) and key.lower().startswith(INITIALS.get(name, ()))
+        key
+        for key, n in square.items()
+        if n == max(square.values()) and key.lower().rpartition(".")[2].startswith(INITIALS.get(name, ()))
     ]
+    candidates = [key for key in candidates if "." not in key] or candidates  # variables before fields
     if len(candidates) != 1:
-        raise ValueError(f"it holds the arrays {', '.join(arrays) or 'none'}: say which, (file, name)")
+        raise ValueError(
+            f"it holds the arrays {', '.join(arrays)}: say which, (file, name)"
+            if arrays
+            else "it holds no array of numbers, by its own name or in a struct; need M and K as variables, or fields"
+        )
     return arrays[candidates[0]]
 
 

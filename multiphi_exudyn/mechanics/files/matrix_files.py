@@ -3,6 +3,7 @@
 .mtx, .mtx.gz            Matrix Market, sparse or dense; of a symmetric matrix one triangle is enough
                          (R. F. Boisvert, R. Pozo, K. Remington, The Matrix Market exchange formats, NISTIR 5935, 1996)
 .mtx, .mtx.gz            Abaqus *MATRIX GENERATE and *MATRIX OUTPUT, with or without nodes (text_matrices.py)
+.mtx                     Abaqus *SUBSTRUCTURE MATRIX OUTPUT
 .sti, .mas               CalculiX, its *FREQUENCY, SOLVER=MATRIXSTORAGE
 .rsa, .rua, .hb, .rb     Harwell-Boeing and Rutherford-Boeing; Ansys HBMAT writes .matrix
 .mat                     MATLAB (array_files.py)
@@ -14,6 +15,7 @@
 from __future__ import annotations
 
 import gzip
+import io
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -22,11 +24,21 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import scipy.io
+import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mechanics.files.array_files import ARRAY_READERS, npz_arrays, select_array
-from multiphi_exudyn.mechanics.files.text_matrices import NodalMatrix, harwell_boeing, lines_of, same_rows, triplets
+from multiphi_exudyn.mechanics.files.text_matrices import (
+    NodalMatrix,
+    complete,
+    harwell_boeing,
+    lines_of,
+    same_rows,
+    substructure_matrices,
+    triplets,
+)
 from multiphi_exudyn.mechanics.structures.arguments import Matrix
+from multiphi_exudyn.mechanics.structures.condensed_structure import condensed_structure
 from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.structures.dofs import DofTable, Place
 from multiphi_exudyn.mechanics.structures.structure import LinearStructure
@@ -42,6 +54,7 @@ NUMBERS = {  # pattern of an entry in a Matrix Market file, by its field
     "real": rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?",
 }
 SHOWN = 40  # bytes of a wrong line that an error shows
+SEARCHED = 4096  # bytes of a file that tell its kind
 BANNER = b"%%MatrixMarket"
 FIRST_BYTES = {  # of files, with their type and usual extension
     BANNER: "Matrix Market, .mtx",
@@ -51,10 +64,31 @@ FIRST_BYTES = {  # of files, with their type and usual extension
     b"\x89HDF": "HDF5, of MATLAB 7.3, .mat",
     b"\x1f\x8b": "a packed file, .mtx.gz",
 }
+UNIVERSAL = (
+    "a universal file: its modes with pyuff: sets = pyuff.UFF(file).read_sets(); structure_from_modes(frequencies, "
+    "shapes, masses) of the sets of type 55"
+)
+HDF5 = "an HDF5 file: arrays of h5py.File(file) are arguments of LinearStructure; one of MATLAB 7.3 ends in .mat"
+TEXT = "numbers in text: LinearStructure(numpy.loadtxt(file, delimiter=','), ...), or as .mtx row, column, value"
 OTHER_FILES = {  # other files of programs, and what to write instead
-    ".full": "an Ansys .full file: write its matrices by HBMAT",
+    ".full": "an Ansys .full file: write its matrices by HBMAT, or with ansys-mapdl-reader: dofs, k, m = "
+    "reader.read_binary(file).load_km(); LinearStructure(m + triu(m, 1).T, k + triu(k, 1).T)",
+    ".rst": "Ansys results: write the matrices of .full by HBMAT, or with ansys-mapdl-reader: rst = "
+    "reader.read_binary(file); structure_from_modes(rst.time_values, shapes) of rst.nodal_solution(i)",
+    ".cdb": "an Ansys model: write its matrices by HBMAT",
+    ".h5": HDF5,
+    ".hdf5": HDF5,
+    ".csv": TEXT,
+    ".txt": TEXT,
+    ".unv": UNIVERSAL,
+    ".uff": UNIVERSAL,
+    ".frd": "CalculiX results: *FREQUENCY, SOLVER=MATRIXSTORAGE writes .sti and .mas",
+    ".med": "Code_Aster results: values, i, j, n = matrix.EXTR_MATR(sparse=True) in its command file; "
+    "LinearStructure(...) of scipy.sparse.csr_array((values, (i, j)), (n, n))",
+    ".rmed": "Code_Aster results: give its matrices, matrix.EXTR_MATR(sparse=True) in its command file",
     ".op2": "Nastran results: write the matrices by OUTPUT4, .op4",
-    ".pch": "a Nastran punch file: write the matrices by OUTPUT4, .op4",
+    ".pch": "a Nastran punch file: write the matrices by OUTPUT4, .op4, or of DMIG with pyYeti: tables = "
+    "pyyeti.nastran.bulk.rddmig(file); LinearStructure(tables['MAAX'].values, tables['KAAX'].values)",
     ".bdf": "a Nastran model: write its matrices by OUTPUT4, .op4",
     ".inp": "an Abaqus or CalculiX model: *MATRIX GENERATE and *MATRIX OUTPUT write .mtx",
     ".odb": "Abaqus results: *MATRIX GENERATE and *MATRIX OUTPUT write .mtx",
@@ -72,7 +106,7 @@ def read_structure(
 ) -> LinearStructure:
     """A linear structure from matrices in files of finite element programs.
 
-        .mtx, .mtx.gz          Matrix Market, and Abaqus *MATRIX OUTPUT
+        .mtx, .mtx.gz          Matrix Market, and Abaqus *MATRIX OUTPUT and *SUBSTRUCTURE MATRIX OUTPUT
         .sti, .mas             CalculiX, SOLVER=MATRIXSTORAGE
         .rsa, .rua, .hb, .rb   Harwell-Boeing; Ansys HBMAT writes .matrix
         .mat                   MATLAB
@@ -89,7 +123,7 @@ def read_structure(
     damping : path, (path, str), array (n, n), ModalDamping, RayleighDamping or None, default None
         C (n, n) [N s/m, N m s] in a file, or damping as of LinearStructure.
     points : mapping of str to int, (int, str) or array (n,), default None
-        As of LinearStructure; degrees of freedom count from 0.
+        As of LinearStructure; degrees of freedom count from 0, and are (node, component) where the files have nodes.
     dofs : path, or sequence of (int, str or int), default None
         (node, component) of every row, or a text file with both in each line ("17 3", "17,uz", CalculiX's "17.3").
         Abaqus files with nodes (FORMAT=MATRIX INPUT) contain it; rows are then sorted by node and component.
@@ -99,7 +133,7 @@ def read_structure(
     Returns
     -------
     LinearStructure
-        The structure with these matrices.
+        The structure with these matrices; for a mass of lower rank a CondensedStructure, as by ``condensed_structure``.
 
     Raises
     ------
@@ -127,7 +161,7 @@ def read_structure(
         raise MultiPhiValueError("dofs: got a table beside files that name their nodes, need none")
     if isinstance(dofs, (str, os.PathLike)):
         dofs = _read("dofs", Path(dofs), "a readable table of nodes and components", _dof_rows)
-    return LinearStructure(
+    return condensed_structure(
         matrices["mass"],
         matrices["stiffness"],
         matrices.get("damping", damping),
@@ -155,7 +189,7 @@ def _matrix(name: str, given: Any) -> Matrix | NodalMatrix:
     if not isinstance(given, (str, os.PathLike)):
         raise MultiPhiTypeError(f"{name}: got {type(given).__name__}, need the path of a file, or (path, array's name)")
     path = Path(given)
-    several = ARRAY_READERS.get(path.suffix.lower())
+    several = ARRAY_READERS.get(path.suffix.lower(), substructure_matrices if _is_substructure(path) else None)
     if several is not None:
         return _read(name, path, "a readable matrix", lambda p: select_array(name, several(p), array_name))
     reader = next((read for ending, read in READERS.items() if path.name.lower().endswith(ending)), None)
@@ -216,13 +250,23 @@ def _mtx(path: Path) -> Matrix | NodalMatrix:
     return _matrix_market(path) if banner == BANNER else triplets(path)
 
 
+def _is_substructure(path: Path) -> bool:
+    return path.suffix.lower() == ".mtx" and path.is_file() and b"*MATRIX" in path.read_bytes()[:SEARCHED].upper()
+
+
 def _matrix_market(path: Path) -> Any:
-    *_, layout, kind, _symmetry = scipy.io.mminfo(path)
+    """A matrix of a file with a banner; under "symmetric" both triangles may be stored, as some programs do."""
+    *_, layout, kind, symmetry = scipy.io.mminfo(path)
     if kind not in NUMBERS:
         raise ValueError(f"it holds {'places without values' if kind == 'pattern' else f'{kind} numbers'}")
     indices = rb"\d+\s+\d+\s+" if layout == "coordinate" else b""
     _check_entries(path, re.compile(rb"\s*" + indices + NUMBERS[kind] + rb"(\s*\n)?"))
-    return scipy.io.mmread(path)
+    if (layout, symmetry) != ("coordinate", "symmetric"):
+        return scipy.io.mmread(path)
+    with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
+        banner, entries = file.readline(), file.read()
+    as_stored = re.sub(rb"symmetric", b"general", banner, flags=re.IGNORECASE)
+    return complete(scipy.sparse.csr_array(scipy.io.mmread(io.BytesIO(as_stored + entries))))
 
 
 def _check_entries(path: Path, entry: re.Pattern[bytes]) -> None:

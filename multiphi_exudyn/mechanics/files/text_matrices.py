@@ -1,7 +1,9 @@
 """Text matrices of finite element programs: triplets of Abaqus and CalculiX, and Harwell-Boeing.
 
-    row column value                           Abaqus *MATRIX OUTPUT, FORMAT=COORDINATE; CalculiX .sti and .mas
+    row column value                           Abaqus *MATRIX OUTPUT, FORMAT=COORDINATE; CalculiX .sti and .mas; Matrix
+                                               Market without its banner, after a line of rows, columns and entries
     node, component, node, component, value    Abaqus *MATRIX OUTPUT, FORMAT=MATRIX INPUT or LABELS
+    rows of one triangle, after a keyword      Abaqus *SUBSTRUCTURE MATRIX OUTPUT
     four lines of header, then columns         Harwell-Boeing and Rutherford-Boeing, assembled, real or integer: Ansys
                                                HBMAT, LS-DYNA, the SuiteSparse collection
 
@@ -15,6 +17,7 @@ Harwell-Boeing sparse matrix collection, RAL-92-086, 1992.
 from __future__ import annotations
 
 import gzip
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -26,12 +29,13 @@ import scipy.sparse
 from multiphi_exudyn.mechanics.structures.arguments import Matrix
 from multiphi_exudyn.mechanics.structures.dofs import DofTable, node_component
 
-__all__ = ["NodalMatrix", "harwell_boeing", "lines_of", "same_rows", "triplets"]
+__all__ = ["NodalMatrix", "complete", "harwell_boeing", "lines_of", "same_rows", "substructure_matrices", "triplets"]
 
 HEADER = 4  # lines
 CARD = 14  # characters of a number in the header
 FORMAT = re.compile(r"\((?:(\d+)P,?)?(\d*)([IEDFG])(\d+)", re.IGNORECASE)
 TYPES = "RI", "SU", "A"  # real or integer; symmetric or unsymmetric; assembled
+SUBSTRUCTURE = re.compile(r"\*MATRIX,TYPE=(\w+)", re.IGNORECASE)
 EMPTY_ROWS = 100  # rows for every entry: with more rows an index is wrong, and the matrix would take much memory
 
 
@@ -58,7 +62,7 @@ def same_rows(matrices: Iterable[NodalMatrix]) -> DofTable:
 
 def triplets(path: Path) -> Matrix | NodalMatrix:
     """A matrix of (row, column, value) or (node, component, node, component, value), one entry a line."""
-    lines = [line.replace(",", " ") for line in lines_of(path) if not line.startswith("*")]
+    lines = [line.replace(",", " ") for line in lines_of(path) if line[0] not in "*%"]
     columns = len(lines[0].split()) if lines else 0
     if columns not in (3, 5):
         raise ValueError(
@@ -69,14 +73,58 @@ def triplets(path: Path) -> Matrix | NodalMatrix:
     if not np.array_equal(labels, table[:, :-1]):
         raise ValueError("a row or column is no whole number")
     if columns == 3:
+        first = 1 if _begins_with_size(lines[0], table) else 0
+        rows, values = labels[first:], table[first:, 2]
         n = int(np.max(labels))
         if np.min(labels) < 1 or n > EMPTY_ROWS * len(lines):
             raise ValueError(f"its {len(lines)} entries are in rows and columns from {np.min(labels)} to {n}")
-        return _complete(scipy.sparse.csr_array((table[:, 2], (labels[:, 0] - 1, labels[:, 1] - 1)), shape=(n, n)))
+        return complete(scipy.sparse.csr_array((values, (rows[:, 0] - 1, rows[:, 1] - 1)), shape=(n, n)))
     own_rows, indices = np.unique(labels.reshape(-1, 2), axis=0, return_inverse=True)
     dofs = DofTable(tuple(node_component("a line", pair) for pair in own_rows.tolist()))
     i, j = indices.reshape(-1, 2).T
-    return NodalMatrix(_complete(scipy.sparse.csr_array((table[:, 4], (i, j)), shape=(len(own_rows),) * 2)), dofs)
+    return NodalMatrix(complete(scipy.sparse.csr_array((table[:, 4], (i, j)), shape=(len(own_rows),) * 2)), dofs)
+
+
+def _begins_with_size(line: str, table: np.ndarray) -> bool:
+    """Whether the first line of (row, column, value) is "rows columns entries", as its own numbers and the others say.
+
+    table: (k, 3) of all lines. Raises ValueError for a first line that is neither a size nor an entry.
+    """
+    if not re.fullmatch(r"\s*(\d+)\s+\1\s+\d+\s*", line) or len(table) < 2:
+        return False
+    n, _, entries = table[0]
+    others = table[1:]
+    is_entry = not np.any(np.all(others[:, :2] == n, axis=1))
+    is_size = n == np.max(others[:, :2]) and entries == len(others)
+    if not (is_entry or is_size):
+        raise ValueError(
+            f"its first line reads {line.strip()!r}, which is no size, as {len(others)} entries follow, in rows and "
+            f"columns up to {np.max(others[:, :2]):g}, and no entry, as this one follows again"
+        )
+    return is_size
+
+
+def substructure_matrices(path: Path) -> dict[str, np.ndarray]:
+    """The matrices of an Abaqus substructure by type, "stiffness", "mass", ...; empty for another file."""
+    triangles: dict[str, list[str]] = {}
+    kind = None
+    for line in lines_of(path):
+        if line[0] == "*":
+            found = SUBSTRUCTURE.match(line.replace(" ", ""))
+            kind = found[1].lower() if found else None
+        elif kind is not None:
+            triangles.setdefault(kind, []).extend(number for number in line.replace(",", " ").split())
+    return {kind: _from_triangle(kind, np.array(numbers, float)) for kind, numbers in triangles.items()}
+
+
+def _from_triangle(kind: str, values: np.ndarray) -> np.ndarray:
+    """A symmetric matrix from the rows of its lower triangle, one after the other."""
+    n = math.isqrt(2 * len(values))
+    if n * (n + 1) // 2 != len(values):
+        raise ValueError(f"its {kind} matrix has {len(values)} numbers, which are no triangle")
+    matrix = np.zeros((n, n))
+    matrix[np.tril_indices(n)] = values
+    return matrix + np.tril(matrix, -1).T
 
 
 def harwell_boeing(path: Path) -> Matrix:
@@ -100,7 +148,7 @@ def harwell_boeing(path: Path) -> Matrix:
     pointers, indices = (array.astype(np.int64) - 1 for array in arrays[:2])
     matrix = scipy.sparse.csc_array((arrays[2], indices, pointers), shape=(rows, columns))
     matrix.check_format(full_check=True)  # indices outside of the shape are read as addresses
-    return _complete(scipy.sparse.csr_array(matrix)) if kind[1] == "S" else matrix
+    return complete(scipy.sparse.csr_array(matrix)) if kind[1] == "S" else matrix
 
 
 def lines_of(path: Path) -> list[str]:
@@ -129,7 +177,7 @@ def _fields(lines: list[str], layout: str, count: int) -> np.ndarray:
     return np.char.replace(np.char.upper(np.array(fields, dtype=str)), "D", "E").astype(float)
 
 
-def _complete(matrix: Matrix) -> Matrix:
+def complete(matrix: Matrix) -> Matrix:
     """A matrix (n, n), with both triangles if only one is given."""
     triangle = scipy.sparse.csr_array(matrix - scipy.sparse.diags_array(matrix.diagonal()))
     triangle.eliminate_zeros()

@@ -18,6 +18,7 @@ import numpy as np
 from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion, StopsMotion
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity, StaticLoad
 from multiphi_exudyn.mechanics.loads.time_functions import (
+    Accelerogram,
     Harmonic,
     Sampled,
     Smooth,
@@ -276,7 +277,7 @@ def unchanging(loads: Any) -> tuple[Any, ...] | None:
 
 def _unchanging(load: Any) -> bool:
     if isinstance(load, StopMotion):
-        return isinstance(load.course, (Harmonic, Sampled, Sweep))
+        return isinstance(load.course, (Accelerogram, Harmonic, Sampled, Sweep))
     point = load.direction if isinstance(load, Gravity) else getattr(load, "at", None)
     return isinstance(load, (ConstantLoad, Gravity, HarmonicLoad, SampledLoad, SweepLoad)) and isinstance(point, str)
 

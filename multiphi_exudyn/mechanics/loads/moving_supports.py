@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.mechanics.loads.samples import Sampled
+from multiphi_exudyn.mechanics.loads.samples import Accelerogram, Sampled
 from multiphi_exudyn.mechanics.loads.time_functions import Harmonic, Smooth, Sweep, TimeFunction, check_time_function
 from multiphi_exudyn.mechanics.structures.structure import At
 
@@ -24,13 +24,13 @@ __all__ = ["BaseMotion", "StopMotion", "StopsMotion"]
 class StopMotion:
     """A contact whose stop moves, g = h.x + gap - z(t).
 
-    The velocity of a rigid contact's stop may not jump: its course is Harmonic, Smooth or Sweep.
+    The velocity of a rigid contact's stop may not jump: its course is anything but Sampled.
 
     Parameters
     ----------
     contact : str
         Name of the contact.
-    course : Harmonic, Sampled, Smooth or Sweep
+    course : Accelerogram, Harmonic, Sampled, Smooth or Sweep
         z(t) [m] along +h, which closes the gap.
 
     Raises
@@ -80,8 +80,8 @@ class BaseMotion:
     direction : str, mapping or array (n,)
         e, displacement of every degree of freedom in a unit rigid-body motion along that of the base: a row, {point:
         coefficient} or a point name.
-    course : Harmonic, Smooth or Sweep
-        z(t) [m], twice differentiable.
+    course : Accelerogram, Harmonic, Smooth or Sweep
+        z(t) [m], twice differentiable; an Accelerogram is given by samples of z'', in g or in any other unit.
     fixed_stops : sequence of str, default ()
         Names of the contacts whose stops do not move; all others move with the base.
 
@@ -106,14 +106,15 @@ class BaseMotion:
     """
 
     direction: At
-    course: Harmonic | Smooth | Sweep
+    course: Accelerogram | Harmonic | Smooth | Sweep
     fixed_stops: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         check_time_function("base motion", self.course)
         if isinstance(self.course, Sampled):
             raise MultiPhiTypeError(
-                "base motion course: got Sampled, whose acceleration is infinite, need Harmonic, Smooth or Sweep"
+                "base motion course: got Sampled, a displacement whose acceleration is infinite at its samples, need "
+                "Harmonic, Smooth, Sweep, or for samples of an acceleration Accelerogram(time, values, factor=9.81)"
             )
         _check_contacts("base motion fixed_stops", self.fixed_stops, "a tuple of contact names")
 

@@ -1,4 +1,4 @@
-"""Samples: a function of time by its values, with straight lines between them."""
+"""Samples: a function of time by its values, or by those of its acceleration, with straight lines between them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
 from multiphi_exudyn.mechanics.structures.arguments import is_real, real_array
 
-__all__ = ["Sampled"]
+__all__ = ["Accelerogram", "Sampled"]
 
 COLLINEAR = 4 * np.finfo(float).eps  # of the largest sample: a sample this close to a line lies on it
 
@@ -99,6 +99,80 @@ class Sampled:
         """The function up to ``end`` [s]; samples on the line between their neighbours are left out."""
         bends = _bends(self.time, self.values)
         return PiecewiseExponential.sampled(self.time[bends], self.values[bends])
+
+
+@dataclass(frozen=True, eq=False)
+class Accelerogram:
+    """Motion z(t) [m] of a base or a stop given by samples of its acceleration, as of an earthquake or a shaker.
+
+        z'' = factor u(t),   z = z' = 0 at the first sample
+
+    u goes in straight lines between samples and is zero before the first and after the last, for which the response is
+    exact. The base then keeps the velocity that the record leaves, as the integral of a record without correction does.
+
+    Parameters
+    ----------
+    time : array (k,)
+        Ascending times [s], two or more.
+    values : array (k,)
+        Acceleration u, in m/s2 divided by ``factor``.
+    factor : float, default 1.0
+        Unit of the record [m/s2]: 9.81 for a record in g, 0.01 for one in cm/s2.
+
+    Raises
+    ------
+    MultiPhiTypeError
+        For values that are not real numbers.
+    MultiPhiValueError
+        For fewer than two samples, unequal numbers of times and values, times that do not ascend, and values that are
+        not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import multiphi_exudyn as mp
+    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
+    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
+    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
+    >>> quake = mp.Accelerogram([0.0, 0.1, 0.2, 0.3], [0.0, 0.8, -0.8, 0.0], factor=9.81)  # in g
+    >>> tr = mp.simulate(mp.MultiPhiModel(chain, [stop]), 0.5, loads=[mp.BaseMotion(np.ones(3), quake)])
+    >>> tr.events[0].kind
+    'close'
+    >>> print(1e3 * quake.displacement(np.array([0.1, 0.2])).round(6))  # mm of the base, which x is relative to
+    [13.08 65.4 ]
+    """
+
+    time: np.ndarray
+    values: np.ndarray
+    factor: float = 1.0
+
+    def __post_init__(self) -> None:
+        samples = Sampled(self.time, self.values)
+        if not is_real(self.factor):
+            raise MultiPhiTypeError(f"accelerogram factor: got {self.factor!r}, need a number [m/s2]")
+        if not np.isfinite(self.factor):
+            raise MultiPhiValueError(f"accelerogram factor: got {self.factor!r}, need a finite number [m/s2]")
+        object.__setattr__(self, "time", samples.time)
+        object.__setattr__(self, "values", samples.values)
+
+    @classmethod
+    def from_csv(cls, path: str | Path, column: int = 1, factor: float = 1.0) -> Accelerogram:
+        """Samples from a CSV file of two or more columns of numbers, time [s] first, as by ``Sampled.from_csv``."""
+        samples = Sampled.from_csv(path, column)
+        return cls(samples.time, samples.values, factor)
+
+    def displacement(self, t: np.ndarray) -> np.ndarray:
+        """Displacement z (k,) [m] at times (k,) [s]."""
+        times = np.asarray(t, float)
+        return self.history(2 * float(np.max(times, initial=0.0))).at(times)
+
+    def acceleration(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
+        """z'' up to ``end`` [s]."""
+        return Sampled(self.time, self.factor * self.values).history(end)
+
+    def history(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
+        """z up to ``end`` [s]."""
+        return self.acceleration(end).integral(end).integral(end)
 
 
 def _bends(time: np.ndarray, values: np.ndarray) -> np.ndarray:

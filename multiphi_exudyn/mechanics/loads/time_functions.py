@@ -1,6 +1,6 @@
 """Functions of time of loads, moving stops and moving bases.
 
-    u(t):   Harmonic, Sampled, Smooth, Sweep
+    u(t):   Accelerogram, Harmonic, Sampled, Smooth, Sweep
 
 Each becomes a piecewise exponential (piecewise_exponential.py), for which the response is known in closed form. A
 harmonic and straight lines between samples are exact; a smooth function and a sweep are interpolated to their
@@ -19,7 +19,7 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mathematics.functions.interpolation import FEW_SAMPLES, MANY_SAMPLES, Samples
 from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
-from multiphi_exudyn.mechanics.loads.samples import Sampled
+from multiphi_exudyn.mechanics.loads.samples import Accelerogram, Sampled
 from multiphi_exudyn.mechanics.structures.arguments import is_real
 
 __all__ = ["Harmonic", "Smooth", "Sweep", "TimeFunction", "check_numbers", "check_time_function"]
@@ -255,7 +255,7 @@ class Sweep:
         )
 
 
-TimeFunction: TypeAlias = "Harmonic | Sampled | Smooth | Sweep"
+TimeFunction: TypeAlias = "Accelerogram | Harmonic | Sampled | Smooth | Sweep"
 
 
 def check_numbers(what: str, **values: float) -> None:
@@ -273,8 +273,10 @@ def _check_tolerance(value: float) -> None:
 
 
 def check_time_function(what: str, course: Any) -> None:
-    if not isinstance(course, (Harmonic, Sampled, Smooth, Sweep)):
-        raise MultiPhiTypeError(f"{what} course: got {type(course).__name__}, need Harmonic, Sampled, Smooth or Sweep")
+    if not isinstance(course, (Accelerogram, Harmonic, Sampled, Smooth, Sweep)):
+        raise MultiPhiTypeError(
+            f"{what} course: got {type(course).__name__}, need Harmonic, Sampled, Smooth, Sweep or Accelerogram"
+        )
 
 
 def _breaks(given: Any) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
 """Structures: M, C, K with named points, given, by their modes, or assembled from others.
 
-Order: arguments, dofs, damping, point_rows, structure, assembly, modal_structure.
+Order: arguments, dofs, damping, point_rows, structure, condensed_structure, assembly, modal_structure.
 """

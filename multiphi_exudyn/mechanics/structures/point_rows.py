@@ -71,6 +71,10 @@ def _point_entries(name: str, given: Any, n: int, dofs: DofTable | None) -> tupl
         label = f"points[{name!r}]"
         return np.array([required_table(label, dofs).place(label, *given)]), np.ones(1)
     if isinstance(given, (int, np.integer)) and not isinstance(given, bool):
+        if dofs is not None:
+            raise MultiPhiValueError(
+                f"points[{name!r}]: got {given}, need (node, component), as ({given}, 'uz'): the rows have nodes"
+            )
         if not 0 <= given < n:
             raise MultiPhiValueError(f"points[{name!r}]: got DoF {given}, need 0 <= DoF < {n}")
         return np.array([given]), np.ones(1)

@@ -19,13 +19,14 @@ import scipy.sparse
 
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.mathematics.eigenproblems.massless_motions import not_definite
 from multiphi_exudyn.mathematics.eigenproblems.modes import complete_modes
 from multiphi_exudyn.mechanics.structures.arguments import Matrix, is_real, one_of, real_array
 from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.structures.dofs import DofTable, Place, dof_table, fixed_dofs
 from multiphi_exudyn.mechanics.structures.point_rows import checked_vector, point_rows
 
-__all__ = ["At", "LinearStructure", "damping_matrix"]
+__all__ = ["At", "LinearStructure", "damping_matrix", "named_row", "symmetric_matrix", "without_rows"]
 
 At: TypeAlias = "str | Mapping[str, float] | np.ndarray"  # point name, {point: coefficient}, or (n,) row
 
@@ -56,7 +57,8 @@ class LinearStructure(Shown):
     damping : array (n, n), ModalDamping, RayleighDamping or None, default None
         C [N s/m, N m s], symmetric positive semidefinite, or its definition by ratios; None for no damping.
     points : mapping of str to int, (int, str) or array (n,), default empty
-        Name to degree of freedom, counted from 0, to (node, component) or to row p; afterwards name to row.
+        Name to degree of freedom, counted from 0, or with dofs to (node, component), or to row p; afterwards name to
+        row.
     dofs : sequence of (int, str or int), default None
         (node, component) of every row of the matrices, "ux", "uy", "uz", "rx", "ry", "rz" or 1 to 6; None if unknown.
         Afterwards a DofTable.
@@ -92,12 +94,12 @@ class LinearStructure(Shown):
     free: np.ndarray = field(default_factory=lambda: np.zeros(0, int), repr=False)
 
     def __post_init__(self, fixed: Iterable[Place]) -> None:
-        mass = _symmetric("mass", self.mass, None)
+        mass = symmetric_matrix("mass", self.mass, None)
         total = mass.shape[0]
         dofs = None if self.dofs is None else dof_table(self.dofs, total)
         supported = fixed_dofs(fixed, total, dofs)
         moving = np.setdiff1d(np.arange(total), supported)
-        mass = _check_positive_definite(_without(supported, moving, mass), moving, dofs)
+        mass = _check_positive_definite(without_rows(supported, moving, mass), moving, dofs)
         stiffness = _semidefinite_diagonal("stiffness", self.stiffness, supported, moving)
         damping = self.damping
         if not (damping is None or isinstance(damping, (ModalDamping, RayleighDamping))):
@@ -168,7 +170,8 @@ def damping_matrix(structure: LinearStructure) -> Matrix | None:
     return damping
 
 
-def _symmetric(name: str, given: Matrix, n: int | None) -> Matrix:
+def symmetric_matrix(name: str, given: Matrix, n: int | None) -> Matrix:
+    """The symmetric part of a matrix (n, n) of an argument with this name, which is symmetric to round-off."""
     matrix = real_array(name, given, "an (n, n) array of real numbers")
     values = matrix.data if scipy.sparse.issparse(matrix) else matrix
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.shape[0] == 0:
@@ -199,7 +202,7 @@ def _largest(matrix: Matrix) -> float:
     return float(np.max(np.abs(matrix.data if scipy.sparse.issparse(matrix) else matrix), initial=0.0))
 
 
-def _without(supported: np.ndarray, moving: np.ndarray, matrix: Matrix) -> Matrix:
+def without_rows(supported: np.ndarray, moving: np.ndarray, matrix: Matrix) -> Matrix:
     """A matrix without the rows and columns that supports fix."""
     if not len(supported):
         return matrix
@@ -210,7 +213,7 @@ def _without(supported: np.ndarray, moving: np.ndarray, matrix: Matrix) -> Matri
 
 
 def _semidefinite_diagonal(name: str, given: Matrix, supported: np.ndarray, moving: np.ndarray) -> Matrix:
-    matrix = _without(supported, moving, _symmetric(name, given, len(supported) + len(moving)))
+    matrix = without_rows(supported, moving, symmetric_matrix(name, given, len(supported) + len(moving)))
     diagonal = matrix.diagonal()
     if np.any(diagonal < -ROUND_OFF * _largest(matrix)):
         worst = int(np.argmin(diagonal))
@@ -223,26 +226,27 @@ def _check_positive_definite(mass: Matrix, moving: np.ndarray, dofs: DofTable | 
     if len(massless):
         also = f" and {len(massless) - 1} more are 0 or less" if len(massless) > 1 else ""
         raise MultiPhiValueError(
-            f"mass: diagonal entry {_entry(moving[massless[0]], dofs)} is {mass.diagonal()[massless[0]]:g}{also}"
+            f"mass: diagonal entry {named_row(moving[massless[0]], dofs)} is {mass.diagonal()[massless[0]]:g}{also}"
             f"{_first(moving[massless[1:]], dofs)}, need values > 0: hold these (fixed=), give them a small mass, or "
-            "condense them statically before, u = R u_m with R.T @ M @ R and R.T @ K @ R"
+            "let them follow statically: condensed_structure(mass, stiffness, ...)"
         )
     if scipy.sparse.issparse(mass):
         return mass  # a factorisation is as expensive as the modes, whose computation checks the mass as well
     try:
         scipy.linalg.cholesky(mass, lower=True)
     except scipy.linalg.LinAlgError as error:
-        raise MultiPhiValueError("mass: indefinite, need a positive definite matrix") from error
+        raise not_definite(mass) from error
     return mass
 
 
 def _first(rows: np.ndarray, dofs: DofTable | None) -> str:
     """Text " (6 (rx of node 10), 7 (ry of node 10), ...)" with the first NAMED rows; empty without rows."""
-    named = [_entry(row, dofs) for row in rows[:NAMED]] + ["..."] * (len(rows) > NAMED)
+    named = [named_row(row, dofs) for row in rows[:NAMED]] + ["..."] * (len(rows) > NAMED)
     return f" ({', '.join(named)})" if named else ""
 
 
-def _entry(row: int, dofs: DofTable | None) -> str:
+def named_row(row: int, dofs: DofTable | None) -> str:
+    """Text "6 (rx of node 10)" for a row of the matrices, "6" without nodes."""
     return str(row) if dofs is None else "{2} ({1} of node {0})".format(*dofs.rows[row], row)
 
 

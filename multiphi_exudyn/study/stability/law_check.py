@@ -25,7 +25,7 @@ Every bound is relative to the absolute values of the terms that are summed.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -51,7 +51,9 @@ __all__ = ["broken_laws"]
 
 INTERVALS = 20  # short intervals within segments, on each of which the laws are checked at NODES instants
 NODES = 6  # of Gauss quadrature, which integrates over an interval of at most one radian exactly
+IMPULSES = 3  # of the intervals over which the forces of contacts are integrated
 EVENTS = 20  # instants of events, and as many ends of segments
+EVEN = 10  # further instants, for the size of the motion
 EXACT = 1e-8  # of the terms of a sum: larger is no round-off
 INTERPOLATED = 1e-4  # the same where a load is interpolated: its tolerance holds for the motion, not for the force
 FAR = 1e-2  # of the largest displacement: its round-off is that of what other masses do not move
@@ -59,6 +61,7 @@ MOVES = 1e-6  # of the largest velocity: slower slip has no direction
 ENERGY = 1e-8  # of the energies turned over
 NO_MOTION = 1e-6  # of what the forces could move a free mass during the run: less is no motion
 TOUCHES = 1e-13  # of a gap's terms: less is none
+BRIEF = 1e-11  # of the run: the same of a shorter bounce
 BOUNCE = 1e-11  # of the largest displacement: a lower bounce may be no more resolved
 SHORTEST = 1e-10  # of the run: a shorter segment is not looked into
 
@@ -69,6 +72,7 @@ def broken_laws(
     start: tuple[np.ndarray, np.ndarray] | None = None,
     intervals: int = INTERVALS,
     seed: int = 0,
+    exact: float = EXACT,
 ) -> list[str]:
     """The laws that a run breaks, one sentence each with an instant and by how much; empty if it obeys all.
 
@@ -84,6 +88,8 @@ def broken_laws(
         How many short intervals within segments are looked at.
     seed : int
         Of the random instants.
+    exact : float
+        Share of the terms of a force or a velocity above which a deviation is no round-off.
 
     Returns
     -------
@@ -92,12 +98,11 @@ def broken_laws(
     """
     if not trajectory.segments:
         return []
-    run = _Run(trajectory, tuple(loads), start)
+    run = _Run(trajectory, tuple(loads), start, exact)
     inside = run.inside(intervals, np.random.default_rng(seed))
     found: list[str] = []
     if inside is not None:
-        object.__setattr__(inside, "terms", _force_terms(run, inside))
-        for check in (_motion, _derivatives, _contacts, _frictions, _laws):
+        for check in (_motion, _derivatives, _contacts, _impulses_of_forces, _frictions, _laws):
             found += check(run, inside)
     return [*found, *_instants(run), *_energies(run, inside)]
 
@@ -106,9 +111,10 @@ def broken_laws(
 class _Inside:
     """Intervals (k, 2) [s] within segments, their Gauss nodes times (k * NODES,) and weights, and there x, x', x''.
 
-    contact, friction: N or -F, and T (k * NODES,) by names. terms: absolute ones of the equation of motion.
+    contact, friction: N or -F, and T (k * NODES,) by names.
     """
 
+    run: _Run
     ends: np.ndarray
     times: np.ndarray
     weights: np.ndarray
@@ -119,7 +125,11 @@ class _Inside:
     v_ends: np.ndarray
     contact: dict[str, np.ndarray]
     friction: dict[str, np.ndarray]
-    terms: np.ndarray = field(init=False)
+
+    @cached_property
+    def terms(self) -> np.ndarray:
+        """Absolute terms (n, k * NODES) of the equation of motion over the roots of the masses (``_force_terms``)."""
+        return _force_terms(self.run, self)
 
     def worst(self, values: np.ndarray) -> np.ndarray:
         """Largest absolute value (..., k * NODES) on the interval of every node, its ends not included."""
@@ -135,14 +145,18 @@ class _Run:
     """A trajectory with what it was given: matrices, rows and forces."""
 
     def __init__(
-        self, trajectory: Trajectory, loads: tuple[Load, ...], start: tuple[np.ndarray, np.ndarray] | None
+        self,
+        trajectory: Trajectory,
+        loads: tuple[Load, ...],
+        start: tuple[np.ndarray, np.ndarray] | None,
+        exact: float,
     ) -> None:
         self.trajectory, self.loads, self.start = trajectory, loads, start
         self.structure, self.elements = trajectory.model.structure, trajectory.model.contacts
         self.mass, self.stiffness = self.structure.mass, self.structure.stiffness
         self._kept: dict[tuple[int, ...], np.ndarray] = {}
         self.root = np.sqrt(np.asarray(self.mass.diagonal(), float))[:, None]
-        self.exact = INTERPOLATED if approximated(loads) else EXACT
+        self.exact = max(exact, INTERPOLATED) if approximated(loads) else exact
         self.complete = trajectory.model.level(()).modes >= self.structure.n
         self.contacts = [element for element in self.elements if isinstance(element, UnilateralContact)]
         self.frictions = [element for element in self.elements if isinstance(element, Friction)]
@@ -179,12 +193,23 @@ class _Run:
 
     @cached_property
     def instants(self) -> np.ndarray:
-        """Times (k,) [s] of some events and of some ends of segments, at most EVENTS of each."""
-        happened = event_table(self.trajectory.events, self.trajectory.model.index)[:, 0]
+        """Times (k,) [s] of some events and of some ends of segments, at most EVENTS of each, and EVEN even ones.
+
+        Without the end of the run, after which a trajectory tells no motion.
+        """
+        run = self.trajectory
+        happened = event_table(run.events, run.model.index)[:, 0]
         chosen = [np.unique(times) for times in (happened, self.bounds)]
-        return np.unique(
-            np.concatenate([t[np.linspace(0, len(t) - 1, min(EVENTS, len(t))).astype(int)] for t in chosen])
-        )
+        chosen = [t[np.linspace(0, len(t) - 1, min(EVENTS, len(t))).astype(int)] for t in chosen]
+        even = np.linspace(run.t_start, run.t_end, EVEN)
+        near = np.abs(even[:, None] - np.concatenate(chosen)) < SHORTEST * run.t_end  # an event by round-off after it
+        times = np.unique(np.concatenate([even[~np.any(near, axis=1)], *chosen]))
+        return times[times < run.t_end]
+
+    @property
+    def has_both_sides(self) -> np.ndarray:
+        """Whether (k,) both sides of the instants are known: not of the first one where the start is not given."""
+        return (self.instants > self.trajectory.t_start) | (self.start is not None)
 
     @cached_property
     def x_sides(self) -> tuple[np.ndarray, np.ndarray]:
@@ -204,12 +229,12 @@ class _Run:
 
     @cached_property
     def length(self) -> float:
-        """Largest sqrt(M_ii) |x_i| at the instants, and what no motion is [m sqrt(kg)]."""
+        """Largest sqrt(M_ii) |x_i| at the instants and way of a counter-surface, and what no motion is [m sqrt(kg)]."""
         largest = float(np.max(np.abs(self.root * self.x_sides[1]), initial=0.0))
-        return (
-            largest
-            + (NO_MOTION * float(np.max(np.abs(self.root * self.v_sides[1]))) + self.idle) * self.trajectory.t_end
-        )
+        belts = [friction.velocity for friction in self.frictions] + [c.tangential_velocity for c in self.rough]
+        carried = float(np.max(np.abs(belts), initial=0.0)) * float(np.max(self.root))
+        velocity = NO_MOTION * float(np.max(np.abs(self.root * self.v_sides[1]), initial=0.0)) + self.idle
+        return largest + (carried + velocity) * self.trajectory.t_end
 
     @cached_property
     def speed(self) -> float:
@@ -219,21 +244,35 @@ class _Run:
     @cached_property
     def acceleration(self) -> float:
         """What the forces do at most to free masses [m/s2 sqrt(kg)]."""
-        x = np.abs(self.x_sides[1])
+        x, v = np.abs(self.x_sides[1]), np.maximum(*np.abs(self.v_sides))
         forces = sum((np.abs(f) for f in self.forces(self.instants)), abs(self.stiffness) @ x)
-        for friction in self.frictions:
-            forces = forces + friction.most * np.abs(self.rows[friction.name])[:, None]
+        if self.has_equation and self.damping is not None:
+            forces = forces + abs(self.damping) @ v
+        pushing = [(friction.name, friction.most) for friction in self.frictions]
+        pushing += [(law.name, float(np.max(np.abs(law.force(self.rows[law.name] @ x))))) for law in self.laws]
+        pushing += [(c.name, c.stiffness * self._deepest(c)) for c in self.contacts if not c.rigid]
+        for name, force in pushing:
+            forces = forces + force * np.abs(self.rows[name])[:, None]
         return float(np.max(forces / self.root, initial=0.0))
+
+    def _deepest(self, contact: UnilateralContact) -> float:
+        """How far [m] an instant is inside a stop, at most."""
+        return float(np.max(-np.asarray(self.trajectory.gap(contact.name, self.instants)), initial=0.0))
 
     @property
     def idle(self) -> float:
         """The part of what the forces could do to free masses during the run that is no motion [m/s sqrt(kg)]."""
         return NO_MOTION * self.acceleration * self.trajectory.t_end
 
-    @property
+    @cached_property
     def smallest_bounce(self) -> float:
-        """Velocity [m/s sqrt(kg)] of bounces that are no longer resolved, as their height is round-off."""
-        return float(np.sqrt(BOUNCE * self.length * self.acceleration))
+        """Velocity [m/s sqrt(kg)] of bounces that are no longer resolved, as their height is round-off.
+
+        Of displacements from equilibria too, to which the forces could move the structure.
+        """
+        slowest = 0.0 if self.laws else 2 * np.pi * float(np.min(self.trajectory.model.level(()).frequencies))
+        reach = self.length + self.acceleration * min(self.trajectory.t_end, 1 / max(slowest, 1e-300)) ** 2
+        return float(np.sqrt(BOUNCE * reach * self.acceleration)) + BRIEF * self.acceleration * self.trajectory.t_end
 
     def forces(self, times: np.ndarray) -> list[np.ndarray]:
         """Forces (n, k) of every load."""
@@ -278,6 +317,7 @@ class _Run:
         times = (ends.mean(axis=1)[:, None] + half * nodes).ravel()
         contacts = [element.name for element in self.pressing]
         return _Inside(
+            run=self,
             ends=ends,
             times=times,
             weights=(half * weights).ravel(),
@@ -390,6 +430,18 @@ def _derivatives(run: _Run, inside: _Inside) -> list[str]:
         terms = (np.max(np.abs(ends), axis=2) + inside.per_interval(np.abs(rate))) * run.root
         allowed = exact * (np.max(terms, axis=0) + FAR * size)
         found += _told(f"{name} as a derivative", np.max(change, axis=0), allowed, middle)
+    return found
+
+
+def _impulses_of_forces(run: _Run, inside: _Inside) -> list[str]:
+    """The impulse of a contact over a few intervals is the integral of its force."""
+    found = []
+    chosen = np.arange(0, len(inside.ends), max(1, len(inside.ends) // IMPULSES))
+    for contact in run.contacts:
+        forces, terms = inside.contact[contact.name], _along(run, run.rows[contact.name], inside.terms)
+        expected, allowed = inside.per_interval(forces)[chosen], run.exact * inside.per_interval(terms)[chosen]
+        impulses = [run.trajectory.contact_impulse(contact.name, *inside.ends[k]) for k in chosen]
+        found += _told(f"impulse of {contact.name}", np.abs(impulses - expected), allowed, inside.ends[chosen, 0])
     return found
 
 
@@ -519,7 +571,8 @@ def _momentum(run: _Run, rigid: Sequence[UnilateralContact], impulses: np.ndarra
         found += _told(
             f"impulse of {contact.name} pulls", -p * np.max(np.abs(row)), EXACT * terms, run.instants, "momenta"
         )
-    allowed = run.exact * terms + (run.smallest_bounce if rigid else 0.0)
+    at_stop = np.any([np.zeros(len(run.instants), bool), *(_touches(run, contact) for contact in rigid)], axis=0)
+    allowed = run.exact * terms + np.where(at_stop, run.smallest_bounce, 0.0)
     rubbing = [k for k, contact in enumerate(rigid) if contact.further]
     for j in np.flatnonzero(np.max(np.abs(rest), axis=0) > allowed) if rubbing else ():
         rows = np.column_stack([run.along[rigid[k].name] / run.root.ravel() for k in rubbing])
@@ -528,16 +581,21 @@ def _momentum(run: _Run, rigid: Sequence[UnilateralContact], impulses: np.ndarra
     return found + _told("balance of momentum", np.max(np.abs(rest), axis=0), allowed, run.instants, "momenta")
 
 
+def _touches(run: _Run, contact: UnilateralContact) -> np.ndarray:
+    """Whether (k,) a contact is at its stop at the instants."""
+    z, _ = run.stop(contact, run.instants)
+    gap = run.rows[contact.name] @ run.x_sides[1] + contact.gap - z
+    return np.asarray(np.abs(gap) <= TOUCHES / run.exact * run.length_of(contact, run.x_sides[1], z))
+
+
 def _rebounds(run: _Run, contact: UnilateralContact, impulse: np.ndarray, alone: np.ndarray) -> list[str]:
     """The contact does not go on into its stop; struck alone and once it leaves it with -e times its velocity."""
     row, name, times = run.rows[contact.name], contact.name, run.instants
     scaled = np.abs(row) / run.root.ravel()
-    z, z_rate = run.stop(contact, times)
-    gap = row @ run.x_sides[1] + contact.gap - z
+    _, z_rate = run.stop(contact, times)
     arriving, leaving = (row @ v - z_rate for v in run.v_sides)
     round_off = run.exact * (run.speed * np.sum(scaled) + np.abs(z_rate)) + run.smallest_bounce * np.sum(scaled)
-    touches = np.abs(gap) <= TOUCHES / run.exact * run.length_of(contact, run.x_sides[1], z)
-    into = np.where(touches & (times < run.trajectory.t_end), -leaving, 0.0)  # a run may end as a contact closes
+    into = np.where(_touches(run, contact) & run.has_both_sides, -leaving, 0.0)
     found = _told(f"{name} goes on into its stop", into, round_off, times, "velocities")
     judged = alone & (impulse * (scaled @ scaled) > round_off)
     if not contact.further:
@@ -560,16 +618,30 @@ def _energies(run: _Run, inside: _Inside | None) -> list[str]:
         scale,
         *(abs(getattr(ledger, n)) for n in ("initial", "work_of_loads", "impact", "damping", "friction", "final")),
     )
+    scale = max(scale, run.acceleration * run.length)  # the work of forces on what they hardly move
     found, at = [], np.array([end])
     found += _told("ledger is open", np.array([abs(ledger.residual)]), ENERGY * scale, at, "its rows")
+    returned = {"damping": _stored_inside(run)}
     for name in ("impact", "damping", "friction", "truncation_kinetic"):
-        found += _told(
-            f"ledger row {name} is negative", np.array([-getattr(ledger, name)]), ENERGY * scale, at, "its rows"
-        )
-    if run.complete and not run.trajectory.model.overrides:
-        own = _energy(run, trajectory, end)
-        found += _told("energy at the end", np.array([abs(own - ledger.final)]), ENERGY * scale, at, "energies")
+        allowed = ENERGY * scale + returned.get(name, 0.0)
+        found += _told(f"ledger row {name} is negative", np.array([-getattr(ledger, name)]), allowed, at, "its rows")
+    happened = event_table(trajectory.events, trajectory.model.index)[:, 0]
+    after = len(happened) and happened[-1] == end  # the last energy is that after the event
+    if run.complete and trajectory.status == "ok" and not after and not trajectory.model.overrides:
+        own, either = _energy(run, trajectory, end)
+        off = np.array([abs(own - ledger.final)])
+        found += _told("energy at the end", off, ENERGY * scale + either, at, "energies")
     return found
+
+
+def _stored_inside(run: _Run) -> float:
+    """Energy [J] of viscous contacts that start open inside their stop: damping gives it back if they close there."""
+    first, stored = np.array([run.trajectory.t_start]), 0.0
+    for contact in run.contacts:
+        if contact.damping and float(run.trajectory.contact_force(contact.name, first[0])) <= 0:
+            gap = float(run.trajectory.gap(contact.name, first[0]))
+            stored += 0.5 * contact.stiffness * min(0.0, gap) ** 2
+    return stored
 
 
 def _energy_terms(run: _Run, x: np.ndarray, v: np.ndarray) -> float:
@@ -583,17 +655,23 @@ def _energy_terms(run: _Run, x: np.ndarray, v: np.ndarray) -> float:
     return float(np.max(terms))
 
 
-def _energy(run: _Run, trajectory: Trajectory, t: float) -> float:
-    """Kinetic and strain energy [J] at an instant, from x, x' and forces of friction springs."""
+def _energy(run: _Run, trajectory: Trajectory, t: float) -> tuple[float, float]:
+    """Kinetic and strain energy [J] at an instant, from x, x' and forces of friction springs.
+
+    And the part of viscous contacts without a force, which may just be opening or open.
+    """
     x, v = np.asarray(trajectory.displacement(t)), np.asarray(trajectory.velocity(t))
-    energy = 0.5 * float(v @ (run.mass @ v)) + 0.5 * float(x @ (run.stiffness @ x))
+    either, energy = 0.0, 0.5 * float(v @ (run.mass @ v)) + 0.5 * float(x @ (run.stiffness @ x))
     for law in run.laws:
         energy += float(law.energy(run.rows[law.name] @ x))
     for contact in run.contacts:
         gap = float(run.rows[contact.name] @ x) + contact.gap - float(run.stop(contact, np.array([t]))[0][0])
-        if not contact.rigid and (contact.damping == 0 or float(trajectory.contact_force(contact.name, t)) > 0):
-            energy += 0.5 * contact.stiffness * min(0.0, gap) ** 2
+        stored = 0.0 if contact.rigid else 0.5 * contact.stiffness * min(0.0, gap) ** 2
+        if contact.damping and float(trajectory.contact_force(contact.name, t)) <= EXACT * contact.stiffness * abs(gap):
+            either += stored
+        else:
+            energy += stored
     springs = [(friction.name, friction.stiffness) for friction in run.frictions]
     for name, spring in (*springs, *((contact.name, contact.tangential_stiffness) for contact in run.rough)):
         energy += 0.5 * float(trajectory.friction_force(name, t)) ** 2 / spring
-    return energy
+    return energy, either

@@ -21,6 +21,7 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.time.many.batch import Batch
 from multiphi_exudyn.time.reliability.impact_warnings import is_taking, spread_contacts
+from multiphi_exudyn.time.reliability.law_span import laws_at_an_end
 from multiphi_exudyn.time.reliability.law_warnings import approximated_laws
 from multiphi_exudyn.time.reliability.run_warnings import ModelWarnings
 from multiphi_exudyn.time.reliability.span_warnings import laws_at_an_end

@@ -137,8 +137,9 @@ class Recorded(LazySequence[Segment], Segments):
             c = c + response.from_force @ level.asymptotic.drive
         if level.channels.force.any():
             c = c + x[:, r:] @ level.channels.force.T @ response.from_force.T
-        terms = row[:r] @ response.shapes + row[n : n + r] @ response.basis.derivative(response.shapes)
-        moved = (c * terms * response.basis.integrals((ends - starts)[:, None])).real.sum()
+        terms = c * (row[:r] @ response.shapes)
+        terms = terms + response.basis.derivative(c * (row[n : n + r] @ response.shapes))
+        moved = (terms * response.basis.integrals((ends - starts)[:, None])).real.sum()
         return float(moved + (row[-1] + x[:, r:] @ row[r:n]) @ (ends - starts))
 
     @property

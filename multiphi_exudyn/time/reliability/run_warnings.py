@@ -17,9 +17,10 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "truncation: ..."         the estimate of the error of displacements (truncation.py), or a Tolerance not held, and
                               the energy lost with it
     "lost energy: ..."        energy lost to truncation, of the largest of the run, where displacements hold
+    "digits: ..."             rigid-body modes, or frequencies, that the digits of the stiffness leave open
     "undamped modes: ..."     modes for which a list of modal ratios has none
     "damping ratios: ..."     ratios that look like per cent
-    "law span: ..."           a force law that the motion drives out of its span (span_warnings.py)
+    "law span: ..."           a force law that the motion drives out of its span (law_span.py)
     "missing modes: ..."      contacts of a structure of modes alone, where its static flexibility is not known
     "linear range: ..."       result of the model's own validity check
     "cluster: ..."            levels that keep more modes than asked for, so that no modes of one frequency are parted
@@ -27,8 +28,9 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "slow mode: ..."          a mode whose period is so long that its motion under loads is lost in round-off
     "load pieces: ..."        loads of so many samples or pieces that the run takes long
     "coarse steps: ..."       steps of Exudyn that delay the motion of modes not matched to them
-    "turning: ..."            a body in Exudyn that turns beyond the linear range, or may do so unseen; a rigid
-    "rigid interface ...:"    interface of it that does
+    "truncated statics: ..."  what the modes leave out of a static solution of Exudyn under forces on a body's interface
+    "turning: ..."            a body in Exudyn that turns beyond the linear range, or may do so unseen
+    "rigid interface ...: "   a rigid interface of a body that turns beyond the linear range
     "slow model: ..."         modes that hardly begin to move in the run: matrices swapped, or units mixed
 """
 
@@ -51,9 +53,9 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.time.loop.verdict import lost_share
 from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
 from multiphi_exudyn.time.reliability.impact_warnings import impact_warnings, is_taking, mesh_warnings, spread_contacts
+from multiphi_exudyn.time.reliability.law_span import LawPlaces, laws_at_an_end, span_warnings
 from multiphi_exudyn.time.reliability.law_warnings import approximated_laws, law_warnings
 from multiphi_exudyn.time.reliability.ledger_warnings import ledger_warnings
-from multiphi_exudyn.time.reliability.span_warnings import laws_at_an_end, span_warnings
 from multiphi_exudyn.time.reliability.truncation_warnings import energy_warning, truncation_warnings, verdict_of
 from multiphi_exudyn.time.segments.segment import Segments
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
@@ -61,6 +63,7 @@ from multiphi_exudyn.time.warnings.model_warnings import (
     advised,
     cluster_warnings,
     damping_warnings,
+    digit_warnings,
     missing_modes,
     static_warnings,
 )
@@ -102,7 +105,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     if tolerance is not None or not (share >= 0 and error >= 0):
         share, error = verdict_of(trajectory, tolerance)
     if tolerance is None and not (share > 0 or error > 0):
-        return advised((*before, *after), tolerance)
+        return (*before, *after)
     struck = general.rigid and error > 0 and _struck(trajectory)
     return advised((*before, *truncation_warnings(model, (share, error), tolerance, struck), *after), tolerance)
 
@@ -146,7 +149,7 @@ class ModelWarnings:
             model.general
             or model.validity is not None
             or bool(approximated_laws(model) or laws_at_an_end(model, [v.states for v in loaded])),
-            (*damping_warnings(model), *missing_modes(model), *static),
+            (*digit_warnings(model), *damping_warnings(model), *missing_modes(model), *static),
             tuple(cluster_warnings(levels)),
             fastest,
             slowest,
@@ -187,20 +190,22 @@ class RunSummary:
     """Summary of a run of a body in Exudyn, which keeps no segments.
 
     levels: visited levels, each once. truncated: energy [J] lost to truncation at the start and at all events.
-    energy: largest sampled kinetic and strain energy of the run [J].
+    energy: largest sampled kinetic and strain energy of the run [J]. places: of force laws beyond their spans.
     """
 
     levels: Sequence[Level]
     truncated: float
     energy: float
+    places: LawPlaces
 
 
 def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
     """Warnings of a run in Exudyn, from its levels and losses."""
-    sentences = [*damping_warnings(model), *missing_modes(model)]
+    sentences = [*digit_warnings(model), *damping_warnings(model), *missing_modes(model)]
     if not model.whole:
         sentences.extend(static_warnings(run.levels))
         sentences.extend(energy_warning(lost_share(abs(run.truncated), run.energy)))
+    sentences.extend(run.places.warnings)
     return tuple(sentences)
 
 

@@ -14,7 +14,8 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.structures.damping import ModalDamping
 from multiphi_exudyn.mechanics.structures.modal_structure import ModalStructure
 
-__all__ = ["REMEDY", "advised", "cluster_warnings", "damping_warnings", "missing_modes", "static_warnings"]
+__all__ = ["REMEDY", "advised", "cluster_warnings", "damping_warnings", "digit_warnings", "missing_modes"]
+__all__ += ["static_warnings"]
 
 PER_CENT = 0.5  # a ratio of a structure is mostly below 0.1, and half of critical damping hardly leaves an oscillation
 STICKING = 8  # modes of a level in which friction sticks: with so many its force is right to 5 % on the rig's beam
@@ -62,6 +63,12 @@ def _sticking(levels: Sequence[Level]) -> Iterator[str]:
             f"truncated friction: only {min(fewest.values())} modes are kept while {names} sticks, so its force may be "
             f"off by 5 % and more until it slips; {REMEDY}"
         )
+
+
+def digit_warnings(model: MultiPhiModel) -> tuple[str, ...]:
+    """Warnings of what the digits of the stiffness leave open of the structure's modes, cached by the model."""
+    found: tuple[str, ...] | None = model.entries.find("digits")
+    return model.entries.keep("digits", model.stiffness_warnings()) if found is None else found
 
 
 def damping_warnings(model: MultiPhiModel) -> Iterator[str]:

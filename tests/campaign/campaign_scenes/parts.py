@@ -11,7 +11,25 @@ import scipy.linalg
 
 import multiphi_exudyn as mp
 
+NEAR = 1e-6  # of the largest value: two motions are the same
 SHORTEST = 60.0  # periods of the fastest level that a scene lasts, at most
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Masses of one coordinate in Exudyn, x_other = ratio x_one; velocity: x' that they are given; x = tied q.
+
+    stop: number of a mass, gap [m] and stiffness [N/m].
+    """
+
+    mass: np.ndarray
+    stiffness: np.ndarray
+    velocity: np.ndarray
+    tied: np.ndarray
+    one: int
+    other: int
+    ratio: float
+    stop: tuple[int, float, float]
 
 
 @dataclass(frozen=True)
@@ -19,7 +37,10 @@ class Scene:
     """Arguments of one run, the system for brute force, and what is asked of both.
 
     shown, frame: x of the run and of brute force are compared as shown x_run and frame x_brute_force.
-    split: instants at which a run is ended and begun again. units: powers of two of time, length and mass.
+    split: instants at which a run is ended and begun again. units: powers of two of time, length and mass. by_laws:
+    whether the answer need not be unique, and is judged by the law check alone. near: how far the run and brute force
+    may be apart, of the largest value. in_exudyn: how a body is judged (campaign_bodies.py); steps: of it; joint: of a
+    system to be reduced.
     """
 
     kind: str
@@ -35,6 +56,11 @@ class Scene:
     frame: np.ndarray | None = None
     split: Sequence[float] = ()
     units: tuple[int, int, int] = (0, 0, 0)
+    by_laws: bool = False
+    near: float = NEAR
+    in_exudyn: str = ""
+    steps: int = 0
+    joint: Joint | None = None
 
 
 @dataclass

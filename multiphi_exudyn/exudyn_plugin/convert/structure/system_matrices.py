@@ -50,7 +50,7 @@ def _tangent_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
     """M, K, C (n, n), and S (n_full, n).
 
     Entries of K that are round-off of the geometric stiffness, or of a force over the system's size, are set to zero:
-    they would be a frequency, or an instability. So are entries of C that are round-off of sqrt(k m).
+    they would be a frequency, or an instability. So are entries of C that are round-off beside the fastest rate.
     """
     springs, geometric = _springs_with_factors(mbs), geometric_stiffness(mbs)
     with _without_stiffness(mbs, springs):
@@ -68,8 +68,19 @@ def _tangent_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
         row = _row(mbs, item) @ basis
         stiffness += item["stiffness"] * np.outer(row, row)
         damping += item["damping"] * np.outer(row, row)
-    critical = math.sqrt(float(np.max(np.abs(stiffness)) * np.max(np.abs(mass))))
-    return mass, stiffness, drop_round_off(damping, np.float64(critical)), basis
+    return mass, stiffness, drop_round_off(damping, _fastest(mass, stiffness) * _masses(mass)), basis
+
+
+def _masses(mass: np.ndarray) -> np.ndarray:
+    """sqrt(m_i m_j) (n, n), the sizes of entries of M."""
+    roots = np.sqrt(np.maximum(np.diagonal(mass), 0.0))
+    return np.outer(roots, roots)
+
+
+def _fastest(mass: np.ndarray, stiffness: np.ndarray) -> float:
+    """Largest rate sqrt(|k| / m) [1/s] of a coordinate by itself."""
+    masses, springs = np.diagonal(mass), np.abs(np.diagonal(stiffness))
+    return math.sqrt(float(np.max(springs[masses > 0.0] / masses[masses > 0.0], initial=0.0)))
 
 
 def _row(mbs: Any, spring: Mapping[str, Any]) -> np.ndarray:
