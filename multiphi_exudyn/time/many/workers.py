@@ -24,7 +24,6 @@ from multiphi_exudyn.time.reliability.impact_warnings import is_taking, spread_c
 from multiphi_exudyn.time.reliability.law_span import laws_at_an_end
 from multiphi_exudyn.time.reliability.law_warnings import approximated_laws
 from multiphi_exudyn.time.reliability.run_warnings import ModelWarnings
-from multiphi_exudyn.time.reliability.span_warnings import laws_at_an_end
 from multiphi_exudyn.time.reliability.truncation_warnings import indicator_threshold, truncation_warnings
 from multiphi_exudyn.time.run.motion import Motion, carry
 from multiphi_exudyn.time.run.refinement import refined
