@@ -138,7 +138,7 @@ def chain_at_two_stops():
     structure = mp.LinearStructure(np.diag([1.0, 1.0, 2.0]), joints, points={"y0": 0, "y1": 1, "y2": 2})
     stops = [mp.UnilateralContact(f"stop {at}", at, 0.5, restitution=0.5) for at in ("y0", "y1")]
     loads = [mp.ConstantLoad(f"y{i}", -10.0 * mass) for i, mass in enumerate((1, 1, 2))]
-    start = {"displacement": -0.5 * np.ones(3), "velocity": -np.ones(3)}
+    start = {"displacement": -0.5 * np.ones(3), "velocity": np.array([0.5, 0.5, -1.0])}  # right after an impact
     return mp.MultiPhiModel(structure, [*stops, *springs(1.0, stiffness=200.0, at="y0")]), loads, start
 
 
