@@ -138,7 +138,7 @@ def chain_at_two_stops():
     structure = mp.LinearStructure(np.diag([1.0, 1.0, 2.0]), joints, points={"y0": 0, "y1": 1, "y2": 2})
     stops = [mp.UnilateralContact(f"stop {at}", at, 0.5, restitution=0.5) for at in ("y0", "y1")]
     loads = [mp.ConstantLoad(f"y{i}", -10.0 * mass) for i, mass in enumerate((1, 1, 2))]
-    start = {"displacement": -0.5 * np.ones(3), "velocity": -np.ones(3)}
+    start = {"displacement": -0.5 * np.ones(3), "velocity": np.array([0.5, 0.5, -1.0])}  # right after an impact
     return mp.MultiPhiModel(structure, [*stops, *springs(1.0, stiffness=200.0, at="y0")]), loads, start
 
 
@@ -162,3 +162,23 @@ def test_the_last_bounce_ends_though_a_spring_slips_first_at_its_instant(scene):
     run = mp.simulate(model, 3.0, loads=loads, **start)
     assert_lawful(run, loads)
     assert len(run.events) < 200
+
+
+def test_a_held_place_that_is_round_off_of_its_map_leaves_no_gap_at_a_stop():
+    """Rigid friction sticks where a stop closes: both hold one body, and are to hold it at one place."""
+    joints = np.array([[100.0, -100.0, 0.0], [-100.0, 110.0, -10.0], [0.0, -10.0, 10.0]])
+    structure = mp.LinearStructure(np.diag([0.5, 2.0, 1.0]), joints, points={"y0": 0, "y1": 1, "y2": 2})
+    stop, block = (
+        mp.UnilateralContact("stop", "y2", 0.0, restitution=0.9),
+        mp.Friction("block", "y2", 2.0, static_limit=3.0),
+    )
+    belts = [mp.Friction(f"belt{k}", "y2", f, stiffness=k, velocity=0.5) for f, k in ((0.5, 10.0), (2.0, 20.0))]
+    loads = [mp.ConstantLoad(f"y{i}", -10.0 * mass) for i, mass in enumerate((0.5, 2.0, 1.0))]
+    run = mp.simulate(
+        mp.MultiPhiModel(structure, [stop, block, *belts]),
+        3.0,
+        displacement=np.ones(3),
+        velocity=-4 * np.ones(3),
+        loads=loads,
+    )
+    assert_lawful(run, loads)
