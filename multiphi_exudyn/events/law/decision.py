@@ -198,7 +198,7 @@ def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 
 @compiled
 def classify_refusals(ints: Ints) -> int:
-    """Return what kind of refused exits WORKED has, as a number from 0 to 3.
+    """7. Return what kind of refused exits WORKED has, as a number from 0 to 3.
 
     0: none. 1: exits of elements not treated yet at this instant, requests in PENDING. 2: exits that are always taken,
     requests in PULLING. 3: others only. An element that has changed counts as treated. An exit that is taken once, and

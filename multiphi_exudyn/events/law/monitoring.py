@@ -99,7 +99,7 @@ def wait_for(
     rate: int,
     asks: int,
 ) -> int:
-    """List the signal of an exit, or the one ``entered``, times ``sign``, or its rate; count + 1.
+    """7. List the signal of an exit, or the one ``entered``, times ``sign``, or its rate; count + 1.
 
     A start value that is round-off, of its own terms or of the map that has made CURRENT, counts as zero. If the sum of
     the exponentials, which has a round-off of its own, is below zero there, the signal is shifted to start at zero. So
