@@ -2,7 +2,7 @@
 
     sweep     gaps without a new model: a stop that has moved by a constant changes only where a level comes to rest
     restart   a run that goes on from another one, which was kept in a file, as if it had not ended
-    record    the ground's acceleration in g, of an earthquake say: a load -M e a(t); displacements are relative to it
+    record    the ground's acceleration in g, of an earthquake say: displacements are relative to it
     damper    a one-way damper: a contact far inside its stop, with hardly any stiffness
     pressed   friction under a normal force that is given in time: a dummy mass, pressed on a rough stop
 
@@ -93,7 +93,7 @@ def record() -> float:
     omega, shaken = 2 * math.pi * 12.0, mp.Harmonic(1e-3, 12.0)  # z(t) = 1 mm cos(omega t) of the base
     samples = np.linspace(0.0, T_END, 5001)
     in_g = -1e-3 * omega**2 * np.cos(omega * samples) / G  # z'' / g: what a record has
-    ground = mp.SampledLoad(-structure.mass @ moves, samples, G * in_g)
+    ground = mp.BaseMotion(moves, mp.Accelerogram(samples, in_g, factor=G))
     model = mp.MultiPhiModel(structure, [mp.UnilateralContact("stop", "middle", 1e-3, 1e6)], modes=12)
     by_record = mp.simulate(model, T_END, loads=[ground])
     by_motion = mp.simulate(model, T_END, loads=[mp.BaseMotion(moves, shaken)])

@@ -1,5 +1,7 @@
 """What reduce makes of joints, turning bodies, user functions, many contacts; and its result among other bodies."""
 
+import itertools
+
 import exudyn as exu
 import exudyn.itemInterface as eii
 import numpy as np
@@ -349,6 +351,46 @@ def test_a_coordinate_without_mass_is_told(refused):
         mbs.AddObject(eii.ObjectMassPoint2D(mass=mass, nodeNumber=node))
     mbs.Assemble()
     refused(ValueError, "mass: got no mass at coordinate 0 of node 'empty' (ObjectMassPoint2D", reduce, mbs)
+
+
+def slider_between_springs(mass, inner, outer):
+    """1 kg on a spring to a slider, which another spring holds before a stop."""
+    system = System()
+    moved = system.mass("mass", 1.0, velocity=0.5)
+    slider = system.mbs.AddNode(eii.Node1D(name="slider"))
+    system.mbs.AddObject(eii.ObjectMass1D(mass=mass, nodeNumber=slider))
+    ends = [system.ground, coordinate(system.mbs, slider, 0, "slider"), moved]
+    for (first, second), stiffness in zip(itertools.pairwise(ends), (outer, inner), strict=True):
+        system.mbs.AddObject(eii.CoordinateSpringDamper(markerNumbers=[first, second], stiffness=stiffness))
+    system.contact("stop", ends[:2], 5e-4, stiffness=1e6)
+    system.mbs.Assemble()
+    return system
+
+
+@pytest.mark.parametrize(("inner", "outer"), [(2e4, 4e4), (5e4, 1e4)])
+def test_the_remedies_for_a_slider_without_mass_are_right(refused, inner, outer):
+    """A small mass against a smaller one in Exudyn's own run, on its stop too; and the springs in series, condensed."""
+    system = slider_between_springs(0.0, inner, outer)
+    refused(ValueError, "mass: got no mass at coordinate 0 of node 'slider'", reduce, system.mbs)
+    with pytest.raises(mp.MultiPhiValueError, match=r"by a small mass there .*condensed_structure\(M, K\)"):
+        linear_structure_from(system.mbs)
+    mass, stiffness = map(np.array, system.mbs.ComputeLinearizedSystem()[:2])
+    condensed = mp.MultiPhiModel(mp.condensed_structure(mass, stiffness)).level(())
+    assert condensed.omega == pytest.approx([np.sqrt(inner * outer / (inner + outer))], rel=1e-12)
+    own = slider_between_springs(1e-9, inner, outer)
+    settings = exu.SimulationSettings()
+    settings.solution.file.write = False
+    settings.timeIntegration.endTime, settings.timeIntegration.numberOfSteps = 0.05, 5000
+    settings.timeIntegration.verboseMode = 0
+    own.mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.GeneralizedAlpha)
+    reduction = reduce(slider_between_springs(1e-6, inner, outer).mbs)
+    run = mp.simulate(reduction.model, 0.05, velocity=reduction.velocity, loads=reduction.loads)
+    assert run.events
+    place, size = (
+        reduction.displacement(run, 0.05)[0],
+        np.max(np.abs(reduction.displacement(run, np.linspace(0, 0.05)))),
+    )
+    assert abs(place - own.mbs.systemData.GetODE2Coordinates()[0]) < 1e-4 * size
 
 
 def test_an_asymmetric_matrix_is_told_by_its_coordinates(refused):

@@ -1,6 +1,7 @@
 """SolveStatic with bodies: it ends in the level whose contacts agree with it, or is refused by name."""
 
 import math
+import warnings
 
 import exudyn as exu
 import numpy as np
@@ -163,8 +164,41 @@ def test_coordinates_of_a_solution_without_its_level_are_no_start(refused, solut
 
 def test_what_too_few_modes_leave_out_is_told_or_refused_by_name(refused):
     told = Solved({"b": (chain(*stops(1e5), modes=1), {"m1": -300.0}, {})})
-    with pytest.warns(mp.MultiPhiWarning, match=r"truncated contact: .* 75 % .*\(body 'b'\)"):
+    with (
+        pytest.warns(mp.MultiPhiWarning, match=r"truncated contact: .* 75 % .*\(body 'b'\)"),
+        pytest.warns(mp.MultiPhiWarning, match="truncated statics: 1 modes leave out"),
+    ):
         told.solve()
     model = chain(*stops(1e9), modes=1)
     neither = Solved({"b": (model, {"m3": -60.0}, {})})
     refused(mp.MultiPhiError, "static solution of 'b': no level was found", neither.solve)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0**-20])
+@pytest.mark.parametrize("modes", [2, 3, "all"])
+@pytest.mark.parametrize("stiffness", [None, 1e4, 1e6, math.inf])
+@pytest.mark.parametrize("forces", [{"m1": -300.0}, {"m1": -400.0, "m3": 300.0}, {"m3": -80.0}])
+def test_what_the_modes_leave_out_of_displacements_is_told(forces, stiffness, modes, scale):
+    """Of a body without contacts, on open and on closed ones, compared with the equilibrium of the structure."""
+    model = chain(*([] if stiffness is None else stops(stiffness)), modes=modes)
+    forces = {name: scale * force for name, force in forces.items()}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            solved = Solved({"b": (model, forces, {})}).solve()
+        except mp.NumericalFailure:
+            assert modes != "all"
+            return
+    x = model.static_equilibrium(forces)[[1, 3]]
+    error = np.max(np.abs([solved.place("b", name) for name in ("m1", "m3")] - x)) / np.max(np.abs(x))
+    told = any(str(each.message).startswith("truncated statics: ") for each in caught)
+    assert told if error > 0.02 else not (told and error < 0.01)
+    assert error < 1e-7 or modes != "all"
+
+
+def test_a_run_tells_nothing_of_a_static_solution_before_it():
+    solved = Solved({"b": (chain(modes=2), {"m1": -300.0}, {"matchedStepSize": 1e-3})})
+    with pytest.warns(mp.MultiPhiWarning, match=r"truncated statics: 2 modes leave out .* % .* at 'm1'.*\(body 'b'\)"):
+        solved.solve()
+    solved.mbs.SolveDynamic(solved.settings, solverType=TRAPEZOIDAL)
+    assert not solved.mbs.variables["multiPhi"]["b"].warnings

@@ -79,7 +79,7 @@ class TestRuns:
             math.acos((2.0 - 0.16 - middle) / (2.0 - middle)) / math.sqrt(29.0), rel=1e-12
         )
         assert abs(run.ledger.residual) < 1e-13 * run.ledger.initial
-        nudged = run.again(run.start.displacement, run.start.velocity)
+        nudged = run.again(run.start.displacement, run.start.velocity, {})
         assert [event.time for event in nudged.events] == [event.time for event in run.events]
 
     def test_from_the_displacement_alone_begin_with_springs_at_rest(self):

@@ -26,6 +26,9 @@ SPRUNG = mp.Friction("guide", "x", 1.5, stiffness=30.0, velocity=0.4)
 LAW = mp.ForceLaw("z", ([-2.0, -0.3, 0.3, 2.0], [-30.0, -1.0, 1.0, 50.0]))
 LIFT = mp.StopMotion("floor", mp.Harmonic(0.1, 0.9))
 QUAKE = mp.BaseMotion(np.array([0.0, 1.0, 0.0]), mp.Harmonic(0.05, 1.3), fixed_stops=("floor",))
+RECORD = mp.Accelerogram([0.0, 1.0, 1.5, 3.0], [0.0, 0.2, -0.3, 0.1], factor=0.5)
+LIFT_BY_RECORD = mp.StopMotion("floor", RECORD)
+QUAKE_BY_RECORD = mp.BaseMotion(np.array([0.0, 1.0, 0.0]), RECORD, fixed_stops=("floor",))
 
 
 def run(contacts, loads, damping=None, modes="all", start=START, end=6.0):
@@ -47,6 +50,8 @@ def run(contacts, loads, damping=None, modes="all", start=START, end=6.0):
         ([SOFT_ROUGH], [WEIGHT, QUAKE]),
         ([DAMPED, SPRUNG, LAW], [WEIGHT, SHAKER, LIFT]),
         ([ROUGH, LAW], [WEIGHT, QUAKE]),
+        ([FLOOR, SPRUNG], [WEIGHT, LIFT_BY_RECORD]),
+        ([SOFT_ROUGH], [WEIGHT, QUAKE_BY_RECORD]),
     ],
 )
 def test_it_is_silent_where_all_laws_hold(contacts, loads, damping, modes):

@@ -4,7 +4,18 @@ import numpy as np
 import pytest
 from small_scene import BEAM, changed, write
 
-from multiphi_exudyn import BaseMotion, Gravity, Harmonic, MultiPhiModel, MultiPhiValueError, StopMotion, SweepLoad
+from multiphi_exudyn import (
+    Accelerogram,
+    BaseMotion,
+    Gravity,
+    Harmonic,
+    MultiPhiModel,
+    MultiPhiValueError,
+    SampledLoad,
+    StopMotion,
+    SweepLoad,
+    simulate,
+)
 from multiphi_exudyn.study.accuracy.budget import budget
 from multiphi_exudyn.study.comparison.compare import compare, summary
 from multiphi_exudyn.study.comparison.findings import findings
@@ -20,6 +31,7 @@ from multiphi_exudyn.study.scene.workbench import prepare, start_configuration
 HARMONIC = {"kind": "harmonic", "at": "tip", "amplitude": 2.0, "frequency_hz": 12.0, "phase": 0.5}
 MOVED = {"kind": "harmonic", "amplitude": 1e-3, "frequency_hz": 12.0}
 SWEPT = {"kind": "sweep", "amplitude": 1e-3, "start_hz": 5.0, "end_hz": 30.0, "duration": 0.5}
+RECORD = {"kind": "accelerogram", "time": [0.0, 0.02, 0.06, 0.1], "values": [0.0, 1.2, -1.2, 0.0], "factor": 9.81}
 SAMPLES = {"time": [0.0, 0.02, 0.2], "values": [0.0, -2.0, 2.0]}
 LOADS = {
     "constant": {"kind": "constant", "at": {"tip": 1.0, "middle": -0.5}, "force": -2.0},
@@ -29,6 +41,8 @@ LOADS = {
     "gravity": {"kind": "gravity", "acceleration": -9.81},
     "stop-motion": {"kind": "stop-motion", "contact": "stop", "course": MOVED | {"phase": -1.5, "amplitude": 2e-3}},
     "base-motion": {"kind": "base-motion", "course": MOVED | {"amplitude": 4e-3}, "fixed_stops": ["stop"]},
+    "accelerogram": {"kind": "base-motion", "course": RECORD},
+    "accelerated stop": {"kind": "stop-motion", "contact": "stop", "course": RECORD | {"factor": 4.0}},
 }
 MODELS = [
     {"kind": "reduced", "name": "r12", "modes": 12},
@@ -65,7 +79,7 @@ def complaint(folder, data):
 class TestForms:
     def test_every_kind_becomes_its_load(self, tmp_path):
         setup = bench_of(tmp_path, at_rest(*LOADS.values()))
-        constant, harmonic, sampled, sweep, gravity, stop, base = setup.loads
+        constant, harmonic, sampled, sweep, gravity, stop, base, quake, pushed = setup.loads
         assert (constant.at, constant.force) == ({"tip": 1.0, "middle": -0.5}, -2.0)
         assert harmonic.course == Harmonic(2.0, 12.0, 0.5)
         np.testing.assert_array_equal(sampled.force, SAMPLES["values"])
@@ -77,12 +91,31 @@ class TestForms:
         assert stop.course == Harmonic(2e-3, 12.0, -1.5)
         assert isinstance(base, BaseMotion)
         assert base.fixed_stops == ("stop",)
+        for load, factor in ((quake, 9.81), (pushed, 4.0)):
+            assert isinstance(load.course, Accelerogram)
+            assert (load.course.values.tolist(), load.course.factor) == (RECORD["values"], factor)
 
     def test_samples_come_from_a_file_beside_the_scene(self, tmp_path):
         np.savetxt(tmp_path / "force.csv", [[0.0, 9.0, 1.0], [0.1, 9.0, -1.0]], delimiter=",", header="t, a, b")
         load = {"kind": "sampled", "at": "tip", "csv": "force.csv", "column": 2}
         (found,) = bench_of(tmp_path, at_rest(load)).loads
         np.testing.assert_array_equal(found.force, [1.0, -1.0])
+
+    @pytest.mark.parametrize("factor", [9.81, 0.01])
+    def test_a_record_from_a_file_shakes_the_base_in_its_unit(self, tmp_path, factor):
+        """Against the force -M e a(t) of the same record."""
+        time, values = np.array([0.0, 0.05, 0.1, 0.2]), np.array([0.0, 6.0, -8.0, 0.0]) / factor
+        np.savetxt(tmp_path / "record.csv", np.transpose([time, values]), delimiter=",", header="s, a")
+        course = {"kind": "accelerogram", "csv": "record.csv", "factor": factor}
+        setup = bench_of(tmp_path, at_rest({"kind": "base-motion", "course": course}))
+        (base,) = setup.loads
+        model, structure = MultiPhiModel(setup.structure, setup.mechanics.contacts, modes=12), setup.structure
+        force = SampledLoad(-structure.mass @ structure.row(base.direction), time, factor * values)
+        shaken, pushed = (simulate(model, 0.3, loads=[load]) for load in (base, force))
+        assert shaken.events
+        times = np.linspace(0.0, 0.3, 50)
+        expected = pushed.at("tip", times)
+        np.testing.assert_allclose(shaken.at("tip", times), expected, atol=1e-9 * np.max(np.abs(expected)))
 
     def test_a_start_left_out_is_rest(self, tmp_path):
         setup = bench_of(tmp_path, at_rest(HARMONIC))
@@ -133,6 +166,19 @@ BROKEN = {
     ),
     "sampled base": (
         [{"kind": "base-motion", "course": {"kind": "sampled"} | SAMPLES}], {}, "loads[0].course: got"
+    ),
+    "an accelerogram that is a load": (
+        [RECORD | {"at": "tip"}], {}, "loads[0]: got"
+    ),
+    "records of two sources": (
+        [{"kind": "base-motion", "course": RECORD | {"csv": "a.csv"}}], {}, "loads[0].course: got"
+    ),
+    "a record that is not there": (
+        [{"kind": "base-motion", "course": {"kind": "accelerogram", "csv": "no.csv"}}], {},
+        "loads[0].course: samples: got",
+    ),
+    "a unit that is none": (
+        [{"kind": "base-motion", "course": RECORD | {"factor": "g"}}], {}, "loads[0].course.factor: got 'g', need"
     ),
     "samples of two sources": ([LOADS["sampled"] | {"csv": "a.csv"}], {}, "loads[0]: got"),
     "samples that go back": (
@@ -220,6 +266,8 @@ def test_every_kind_is_told_in_words(tmp_path):
         "a weight of -9.81 m/s²",
         "a stop of stop that moves by 0.002 m, harmonic at 12 Hz",
         "a base that moves by 0.004 m, harmonic at 12 Hz, which stop does not follow",
+        "a base that accelerates by 9.81 m/s² times 4 samples",
+        "a stop of stop that accelerates by 4 m/s² times 4 samples",
     )
 
 

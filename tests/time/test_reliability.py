@@ -26,7 +26,6 @@ from multiphi_exudyn.time.reliability.run_warnings import warnings_of
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 
 END = 0.3
-CALM = np.linspace(0, 1e-2, 18)
 
 
 @functools.cache

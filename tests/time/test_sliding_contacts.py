@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.study.stability.law_check import broken_laws
 
 
 @pytest.mark.parametrize("speed", [2.0, -2.0, 0.3])
@@ -59,3 +60,34 @@ def test_a_block_that_rests_at_a_stop_slips_into_it_and_away_from_it(side, stiff
         assert_allclose(run.contact_force("stop", t), 2 * np.sin(t) - 1.0 - stiffness * gap, rtol=0, atol=1e-9)
         again = run.stick_intervals("block")[1]
         assert again == pytest.approx((closed[1], np.pi + np.arcsin((1.3 - stiffness * gap) / 2)), abs=1e-7)
+
+
+@pytest.mark.parametrize("stiffness", [1.0, 3.0])
+def test_a_force_law_that_cancels_its_stiffness_is_refused_while_it_slides(stiffness):
+    """Its force then drives the slip of a mass that nothing else holds, with the fourth power of time."""
+    structure = mp.LinearStructure(np.eye(2), np.zeros((2, 2)), points={"z": 0, "x": 1})
+    law = mp.ForceLaw("z", ([-2, -1, 0, 1, 2], [-stiffness, stiffness, 0, -stiffness, stiffness]), name="law")
+    messages = []
+    for rubs in ({}, {"tangential": "x", "friction": 0.5}):
+        floor = mp.UnilateralContact("floor", {"z": -1.0}, 0.5, stiffness, **rubs)
+        model = mp.MultiPhiModel(structure, [floor, law], modes="all")
+        run = mp.simulate(model, 2.0, velocity=[1.0, -1.0])
+        messages.append(run.message)
+        if not rubs:
+            assert not broken_laws(run, [], (np.zeros(2), np.array([1.0, -1.0])))
+    assert not messages[0]
+    assert "negative stiffness cancels that of a mode beside contacts that slide" in messages[1]
+
+
+@pytest.mark.parametrize("start", [(0.0, 0.0, 1.0), (0.2, 0.1, 1.0), (-0.3, 0.0, 2.0)])
+def test_forces_that_cancel_elsewhere_are_right_while_it_slides(start):
+    """A falling law and the spring of a friction element cancel on a mass that the contact drags along."""
+    structure = mp.LinearStructure(np.eye(3), np.zeros((3, 3)), points={"x": 0, "y": 1, "z": 2})
+    both = {"x": 1.0, "y": 1.0}
+    law = mp.ForceLaw(both, ([-2, -1, 0, 1, 2], [-4, 1, 0, -1, 4]), name="law")
+    spring = mp.Friction("spring", both, 2.0, stiffness=1.0)
+    floor = mp.UnilateralContact("floor", {"z": -1.0}, 0.0, 10.0, friction=0.25, tangential={"y": 1.0, "z": 1.0})
+    velocity = np.array(start)
+    run = mp.simulate(mp.MultiPhiModel(structure, [floor, law, spring], modes="all"), 2.0, velocity=velocity)
+    assert run.status == "ok"
+    assert not broken_laws(run, [], (np.zeros(3), velocity))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from rough_floor import RoughFloor
+from scipy.linalg import expm
 
 import multiphi_exudyn as mp
 
@@ -104,3 +105,52 @@ def test_a_free_body_beside_it_is_not_damped_by_round_off(mass):
     assert_allclose(run.at("free", t), 64 * t + 16 * t**2, rtol=1e-12, atol=1e-11)
     assert np.max(np.abs(run.at("y", t))) < 1e-11
     assert abs(run.ledger.residual) < 1e-11 * run.ledger.initial
+
+
+MU, GRAVITY, GUIDE, SPEED = 0.3, 10.0, 10.0, 2.0
+
+
+def guided_pair(masses, stiffness, ground, surface):
+    """Two joined bodies, the first on the floor and guided across it by a friction spring on a moving surface.
+
+    C is proportional to K, and nothing holds the pair along the floor.
+    """
+    joint = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    springs = stiffness * np.kron(joint, np.eye(2)) + np.diag([0.0, ground, 0.0, 0.0])
+    points = {name: i for i, name in enumerate(("x", "y", "x2", "y2"))}
+    structure = mp.LinearStructure(np.diag(masses), springs, 0.05 * springs, points)
+    floor = mp.UnilateralContact("floor", "y", 0.0, friction=MU, tangential="x")
+    return structure, [floor, mp.Friction("guide", "y", 1e3, stiffness=GUIDE, velocity=surface)]
+
+
+def slid(structure, surface, time):
+    """x of both bodies and y2 by an exponential of their equations while the guide sticks, and the pressure N.
+
+    N = m g - k y2 - c y2' - k_guide v t,   m x'' = -mu N along the floor
+    """
+    kept, m = [0, 2, 3], np.diag(structure.mass)
+    force, motion = np.zeros((4, 8)), np.zeros((8, 8))  # of (x, x2, y2), their speeds, 1 and t
+    force[:, :3], force[:, 3:6] = -structure.stiffness[:, kept], -structure.damping[:, kept]
+    force[1::2, 6], force[1, 7] = -GRAVITY * m[1::2], GUIDE * surface
+    pressure = -force[1]
+    motion[:3, 3:6], motion[7, 6] = np.eye(3), 1.0
+    motion[3:6] = force[kept] / m[kept][:, None]
+    motion[3] -= MU * pressure / m[0]
+    z = expm(motion * time) @ [0, 0, 0, SPEED, SPEED, 0, 1, 0]
+    return z[:3], pressure @ z
+
+
+@pytest.mark.parametrize("surface", [0.0, 0.3, -0.5])
+@pytest.mark.parametrize(("stiffness", "ground"), [(100.0, 0.0), (100.0, 30.0), (100.0, 100.0), (50.0, 100.0)])
+@pytest.mark.parametrize("masses", [(1, 1, 1, 1), (1, 1, 2, 1), (1, 1, 3, 1), (0.5, 0.5, 2, 0.5), (1, 0.5, 0.5, 2)])
+def test_round_off_of_the_reaction_damps_no_free_motion_along_the_floor(masses, stiffness, ground, surface):
+    structure, parts = guided_pair(masses, stiffness, ground, surface)
+    loads = [mp.ConstantLoad("y", -GRAVITY * masses[1]), mp.ConstantLoad("y2", -GRAVITY * masses[3])]
+    run = mp.simulate(mp.MultiPhiModel(structure, parts), 0.3, velocity=[SPEED, 0, SPEED, 0], loads=loads)
+    assert run.status == "ok"
+    end = min([0.3, *(event.time for event in run.events if event.time > 0)])
+    expected, _ = slid(structure, surface, end)
+    assert_allclose([run.at(at, end) for at in ("x", "x2", "y2")], expected, rtol=0, atol=1e-13)
+    assert run.contact_force("floor", 0.99 * end) == pytest.approx(slid(structure, surface, 0.99 * end)[1], rel=1e-12)
+    assert run.ledger.friction > 0
+    assert abs(run.ledger.residual) < 1e-12 * run.ledger.initial

@@ -7,6 +7,7 @@ from small_structures import chain
 from true_law import against_viscous
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.study.stability.law_check import broken_laws
 
 T = np.linspace(0, 12, 121)
 
@@ -109,3 +110,51 @@ class TestLaw:
         assert np.min(run.contact_force("stop", T)) >= -1e-12
         assert abs(run.ledger.residual) < 1e-11
         assert run.ledger.damping > 0
+
+
+def truncated_beam(seed):
+    """A cantilever on one or two damped stops, thrown, bent, pressed or shaken, in 8 to 14 modes."""
+    random = np.random.default_rng([seed, 77])
+    section = mp.Section.rectangle(0.0, 1.0, width=0.03, height=0.01, youngs_modulus=4e9, density=3333.0)
+    beam = mp.planar_beam(mp.Beam([section], {"mid": 0.5, "tip": 1.0}), 20, mp.ModalDamping(0.01))
+    stops = [
+        mp.UnilateralContact(
+            at, at, random.choice([0.0, 0.01]), 10 ** random.uniform(2, 5), damping=10 ** random.uniform(-1, 2.5)
+        )
+        for at in (["mid"], ["tip"], ["mid", "tip"])[seed % 3]
+    ]
+    loads = ([], [mp.ConstantLoad("tip", -1.0)], [mp.HarmonicLoad("tip", 1.0, random.uniform(0.5, 8))])[seed // 3 % 3]
+    model = mp.MultiPhiModel(beam, stops, modes=int(random.integers(8, 15)))
+    x, v = model.static_equilibrium({"tip": random.uniform(1, 5)}), np.zeros(beam.n)
+    if seed % 2:
+        x, v = 0 * x, -random.uniform(0.3, 2) * (np.array(beam.row("tip")) + np.array(beam.row("mid")))
+    return model, (x, v), loads
+
+
+@pytest.mark.parametrize("seed", range(18))
+def test_of_a_truncated_model_it_lets_go_where_its_force_ends(seed):
+    """The modes with the stop and those without it tell its force apart, by what both leave out."""
+    model, start, loads = truncated_beam(seed)
+    run = mp.simulate(model, 1.0, *start, loads)
+    assert run.status == "ok"
+    assert {"close", "open"} <= {event.kind for event in run.events}
+    for stop in model.contacts:
+        force = run.contact_force(stop.name, np.linspace(0, 1, 4001))
+        assert np.min(force) >= -1e-9 * np.max(force)
+    assert not broken_laws(run, loads, start)
+
+
+@pytest.mark.parametrize("restitution", [0.3, 1.0])
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+def test_struck_off_its_stop_it_lets_go_at_once(friction, restitution):
+    """A rigid wall ends its approach, and its slip, while it pushes."""
+    structure = mp.LinearStructure(np.eye(2), np.zeros((2, 2)), None, {"x": 0, "y": 1})
+    rubs = {"friction": friction, "tangential": "x"} if friction else {}
+    soft = mp.UnilateralContact("soft", "y", 0.0, 1000.0, damping=50.0, **rubs)
+    wall = mp.UnilateralContact("wall", {"x": 1.0, "y": 3.0}, 0.02, restitution=restitution)
+    start = np.array([0.0, 0.01]), np.array([-0.5, -2.0])
+    run = mp.simulate(mp.MultiPhiModel(structure, [soft, wall], modes="all"), 1.0, *start)
+    struck = next(event.time for event in run.events if event.contact == "wall")
+    assert run.contact_force("soft", struck - 1e-9) > 50.0
+    assert [event.time for event in run.events if event.contact == "soft" and event.kind == "open"] == [struck]
+    assert not broken_laws(run, [], start)

@@ -65,12 +65,15 @@ BRIEF = 1e-12  # relative to the time so far: a shorter bounce is the last
 
 
 @compiled
-def is_on_last_bounce(ints: Ints, state: int, element: int) -> int:
-    """Return 1 if an open contact is on its last bounce."""
-    level = ints[state + LEVEL]
+def is_on_last_bounce(ints: Ints, element: int) -> int:
+    """Return 1 if an open contact comes to an instant on its last bounce.
+
+    Whatever other elements do first at that instant, the contact is to stay closed.
+    """
+    level = ints[REACHED + LEVEL]
     if ints[ints[level + STATES] + element] != OPEN:
         return 0
-    return 1 if ints[ints[state + PHASES] + ints[ints[level + FIRST_EXITS] + element]] == LANDING else 0
+    return 1 if ints[ints[REACHED + PHASES] + ints[ints[level + FIRST_EXITS] + element]] == LANDING else 0
 
 
 @compiled
@@ -98,7 +101,7 @@ def apply_further_impact(ints: Ints, numbers: Numbers, count: int) -> int:
 def has_rebounded(ints: Ints, numbers: Numbers, k: int) -> int:
     """Return 1 if a touching contact has restitution and has been struck."""
     contact = ints[ints[TOUCHING] + k]
-    rebounds = numbers[ints[RESTITUTIONS] + contact] > 0.0 and is_on_last_bounce(ints, WORKED, contact) == 0
+    rebounds = numbers[ints[RESTITUTIONS] + contact] > 0.0 and is_on_last_bounce(ints, contact) == 0
     return 1 if rebounds and numbers[ints[IMPULSES] + k] > 0.0 else 0
 
 
@@ -157,7 +160,7 @@ def mark_last_bounces(ints: Ints, numbers: Numbers) -> None:
             round_off = ZERO * numbers[INSTANT_TIME] * speed
             if struck == 1 and ints[phase] == RECOVERING and -gap(ints, numbers, WORKED, i) <= round_off:
                 ints[phase] = ARMED
-            last = ints[ints[LASTS] + i] == 1 or (struck == 0 and is_on_last_bounce(ints, REACHED, i) == 1)
+            last = ints[ints[LASTS] + i] == 1 or (struck == 0 and is_on_last_bounce(ints, i) == 1)
             if last and ints[phase] == ARMED:
                 ints[phase] = LANDING
     for k in range(ints[level + EXIT_COUNT]):

@@ -64,6 +64,7 @@ from multiphi_exudyn.events.arrays import (
     STRIKING,
     TOGETHER,
     TRANSITIONS_NOW,
+    VISCOUS,
     WORKED,
 )
 from multiphi_exudyn.events.law.bounces import mark_last_bounces
@@ -180,7 +181,11 @@ def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
                         ints[freed + i] = 1
             status = apply_requests(ints, numbers, waves, pending)
         elif refusals == 2:  # treated before: changes of others at this instant have removed its reaction
+            changes = ints[CHANGE_COUNT]
             status = switch(ints, numbers, waves, ints[PULLING])
+            if status == OK and ints[CHANGE_COUNT] == changes:
+                hold_back(ints, WORKED)
+                return OK
         else:
             hold_back(ints, WORKED)
             return OK
@@ -193,11 +198,12 @@ def settle(ints: Ints, numbers: Numbers, waves: Waves) -> int:
 
 @compiled
 def classify_refusals(ints: Ints) -> int:
-    """Return what kind of refused exits WORKED has, as a number from 0 to 3.
+    """7. Return what kind of refused exits WORKED has, as a number from 0 to 3.
 
     0: none. 1: exits of elements not treated yet at this instant, requests in PENDING. 2: exits that are always taken,
-    requests in PULLING. 3: others only. An element that has changed counts as treated. An exit that is taken once is
-    taken if another element has changed since; it does not wait if an impact at this instant has reversed it.
+    requests in PULLING. 3: others only. An element that has changed counts as treated. An exit that is taken once, and
+    that of a viscous contact that would pull, is taken if another element has changed since; the first one does not
+    wait if an impact at this instant has reversed it.
     """
     level, treated, pending, always_taken = ints[WORKED + LEVEL], ints[HEARD], ints[PENDING], ints[PULLING]
     for k in range(ints[FIRST_CHANGE], ints[CHANGE_COUNT]):
@@ -215,7 +221,9 @@ def classify_refusals(ints: Ints) -> int:
             if ints[treated + element] == 0:
                 ints[pending + element] = ints[exit_ + ASKED]
                 untreated = 1
-            once = ints[exit_ + FIRMNESS] == TAKEN_ONCE and is_return(ints, element, ints[exit_ + ASKED]) == 0
+            viscous = ints[exit_ + ASKED] == OPEN and ints[ints[KINDS] + element] == VISCOUS
+            once = viscous or ints[exit_ + FIRMNESS] == TAKEN_ONCE
+            once = once and is_return(ints, element, ints[exit_ + ASKED]) == 0
             if ints[exit_ + FIRMNESS] == ALWAYS_TAKEN or ints[exit_ + FIRMNESS] == TAKEN_FALLING or once:
                 ints[always_taken + element] = ints[exit_ + ASKED]
                 taken_count = 1

@@ -1,4 +1,4 @@
-"""Monitoring: the signals that a motion is searched for, and the requests when they fall (sentences 1, 5 and 6).
+"""Monitoring: the signals that a motion is searched for, and the requests when they fall (sentences 1, 5 to 7).
 
 The first descent through zero of a signal, of its negative or of its rate (zero_crossing.py) makes an exit request a
 change, or arms it.
@@ -23,10 +23,12 @@ from multiphi_exudyn.events.arrays import (
     FALLEN,
     FLOW_BASIS,
     FLOW_COUNT,
+    KINDS,
     LANDING,
     LEVEL,
     MODES,
     NOISES,
+    OPEN,
     PHASES,
     PLACE,
     RATED,
@@ -39,8 +41,10 @@ from multiphi_exudyn.events.arrays import (
     SIGNAL,
     SIGNALS,
     SPEED,
+    STATES,
     SWING,
     UNMOVED,
+    VISCOUS,
     WAITING,
     WORK_WAVES,
 )
@@ -95,10 +99,11 @@ def wait_for(
     rate: int,
     asks: int,
 ) -> int:
-    """List the signal of an exit, or the one ``entered``, times ``sign``, or its rate; count + 1.
+    """7. List the signal of an exit, or the one ``entered``, times ``sign``, or its rate; count + 1.
 
     A start value that is round-off, of its own terms or of the map that has made CURRENT, counts as zero. If the sum of
-    the exponentials, which has a round-off of its own, is below zero there, the signal is shifted to start at zero.
+    the exponentials, which has a round-off of its own, is below zero there, the signal is shifted to start at zero. So
+    is the force that truncation has left a viscous contact at its opening.
     """
     level = ints[CURRENT + LEVEL]
     signal = entered if entered > 0 else ints[level + EXITS] + exit_number * EXIT_INTS + SIGNAL
@@ -122,7 +127,8 @@ def wait_for(
             size += abs(numbers[row + n + i]) * (abs(numbers[v + i]) + (numbers[swing + i] if rate == 0 else 0.0))
             begins += numbers[row + n + i] * numbers[v + i]
     may_be_zero = sign * begins <= ZERO * size
-    if may_be_zero and abs(begins) <= ZERO * (size + mapped_size(ints, numbers, CURRENT, signal, rate)):
+    is_round_off = abs(begins) <= ZERO * (size + mapped_size(ints, numbers, CURRENT, signal, rate))
+    if may_be_zero and (is_round_off or (entered > 0 and is_open_viscous(ints, level, exit_number) == 1)):
         constant -= sign * min(sign * start_value(ints, waves, first, constant), 0.0)
     if sign < 0.0:
         for j in range(p):
@@ -132,6 +138,14 @@ def wait_for(
     ints[ints[WAITING] + 2 * count] = exit_number
     ints[ints[WAITING] + 2 * count + 1] = asks
     return count + 1
+
+
+@compiled
+def is_open_viscous(ints: Ints, level: int, exit_number: int) -> int:
+    """Return 1 if an exit is the one by which a viscous contact closes."""
+    exit_ = ints[level + EXITS] + exit_number * EXIT_INTS
+    viscous = ints[ints[KINDS] + ints[exit_ + ELEMENT]] == VISCOUS
+    return 1 if viscous and ints[ints[level + STATES] + ints[exit_ + ELEMENT]] == OPEN else 0
 
 
 @compiled

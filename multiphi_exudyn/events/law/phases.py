@@ -31,8 +31,6 @@ from multiphi_exudyn.events.arrays import (
     NEEDED_KEY,
     OPEN,
     PHASES,
-    PLACE,
-    REACH,
     REACHED,
     RECOVERING,
     REFUSED,
@@ -42,7 +40,6 @@ from multiphi_exudyn.events.arrays import (
     SEARCH_WAVES,
     SETTLED,
     SIGNAL,
-    SPRINGS,
     STATES,
     UNMOVED,
     WORK_WAVES,
@@ -52,7 +49,6 @@ from multiphi_exudyn.events.states.flow import expand
 from multiphi_exudyn.events.states.signal_flow import signal_sizes, signal_waves
 from multiphi_exudyn.events.states.signals import held_part, held_size, mapped_size, rate_sign, row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
-from multiphi_exudyn.mathematics.round_off import FOLLOWING, ZERO
 from multiphi_exudyn.mathematics.search.zero_crossing import first_sign
 from multiphi_exudyn.mechanics.elements.element import ALWAYS_TAKEN, MAY_RECOVER, NEVER_RECOVERS, TAKEN_ONCE
 
@@ -73,10 +69,7 @@ __all__ = [
 
 @compiled
 def phase_of(ints: Ints, numbers: Numbers, waves: Waves, state: int, exit_: int) -> int:
-    """1, 5. ARMED where s is or becomes positive, RECOVERING where it is negative and may rise, else REFUSED.
-
-    A friction spring that is beyond its limit by no more than it moves in the round-off of an instant may rise, too.
-    """
+    """1, 5. ARMED where s is or becomes positive, RECOVERING where it is negative and may rise, else REFUSED."""
     signal, mapped, firmness = exit_ + SIGNAL, 0.0, ints[exit_ + FIRMNESS]
     if firmness in (ALWAYS_TAKEN, NEVER_RECOVERS):  # a reaction, or what may not be negative by round-off
         mapped = mapped_size(ints, numbers, state, signal, 0)
@@ -89,21 +82,7 @@ def phase_of(ints: Ints, numbers: Numbers, waves: Waves, state: int, exit_: int)
     if value == 0 and rate >= 0:
         return ARMED
     recovers = firmness == MAY_RECOVER or firmness >= TAKEN_ONCE
-    if rate > 0 and not recovers and numbers[ints[SPRINGS] + ints[exit_ + ELEMENT]] > 0.0:
-        recovers = (
-            row_sign(ints, numbers, state, signal, FOLLOWING / ZERO * swept_size(ints, numbers, state, signal)) == 0
-        )
     return RECOVERING if rate > 0 and recovers else REFUSED
-
-
-@compiled
-def swept_size(ints: Ints, numbers: Numbers, state: int, signal: int) -> float:
-    """Return the size of the terms of a signal and of what the velocities change it by."""
-    n, row = ints[ints[state + LEVEL] + MODES] + ints[CHANNELS], ints[signal + ROW]
-    size = abs(numbers[row + 2 * n])
-    for i in range(n):
-        size += abs(numbers[row + i]) * (abs(numbers[ints[state + PLACE] + i]) + numbers[ints[state + REACH] + i])
-    return size
 
 
 @compiled

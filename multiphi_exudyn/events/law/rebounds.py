@@ -100,7 +100,7 @@ def set_rebound_speeds(ints: Ints, numbers: Numbers, state: int, count: int) -> 
     fill_rows(ints, numbers, ints[state + LEVEL], ints[TOUCHING], count, 0)
     for k in range(count):
         contact = ints[ints[TOUCHING] + k]
-        restitution = 0.0 if is_on_last_bounce(ints, WORKED, contact) == 1 else numbers[ints[RESTITUTIONS] + contact]
+        restitution = 0.0 if is_on_last_bounce(ints, contact) == 1 else numbers[ints[RESTITUTIONS] + contact]
         speed = 0.0 if restitution == 0.0 else row_speed(ints, numbers, state, k)
         numbers[ints[WANTED] + k] = -restitution * speed if speed != 0.0 else 0.0
         bouncing += 1 if numbers[ints[WANTED] + k] > 0.0 else 0
@@ -126,7 +126,7 @@ def collide_and_rebound(
         return FAILED
     loss_compression = numbers[losses + BY_IMPACT] - loss_before
     for k in range(count):
-        last = is_on_last_bounce(ints, WORKED, ints[touching + k]) == 1
+        last = is_on_last_bounce(ints, ints[touching + k]) == 1
         restitution = 0.0 if last else numbers[ints[RESTITUTIONS] + ints[touching + k]]
         numbers[ints[FURTHER] + k] = max(numbers[ints[FURTHER] + k], 0.0)
         numbers[least + k] = restitution * numbers[ints[FURTHER] + k]
@@ -169,7 +169,7 @@ def check_restitutions(ints: Ints, numbers: Numbers, state: int, count: int) -> 
         for j in range(k):
             other_contact = ints[ints[TOUCHING] + j]
             same = numbers[ints[RESTITUTIONS] + contact] == numbers[ints[RESTITUTIONS] + other_contact]
-            last = is_on_last_bounce(ints, WORKED, contact) == 1 or is_on_last_bounce(ints, WORKED, other_contact) == 1
+            last = is_on_last_bounce(ints, contact) == 1 or is_on_last_bounce(ints, other_contact) == 1
             struck = speed < 0.0 and row_speed(ints, numbers, state, j) < 0.0
             if struck and not same and not last and ints[groups + k] == ints[groups + j]:
                 ints[ints[CAUSED_BY] + contact] = 1

@@ -33,7 +33,7 @@ from multiphi_exudyn.events.law.impact import collide
 from multiphi_exudyn.events.law.phases import becomes, entered_signal, first_exit, is_denied, update_phases
 from multiphi_exudyn.events.law.redundancy import drop_redundant_stick
 from multiphi_exudyn.events.law.resting import same_speed
-from multiphi_exudyn.events.states.signals import mapped_size, row_sign
+from multiphi_exudyn.events.states.signals import mapped_size, rate_sign, row_sign
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, Waves, compiled
 from multiphi_exudyn.mechanics.elements.element import ALWAYS_TAKEN
 
@@ -118,7 +118,7 @@ def is_unconditional(ints: Ints, element: int, requested: int) -> int:
 
 @compiled
 def would_pull_if_closed(ints: Ints, numbers: Numbers, waves: Waves, state: int, element: int) -> int:
-    """7. Return 1 if a viscous contact is open and would pull if it were closed; or NEED."""
+    """7. Return 1 if a viscous contact is open and would pull if it were closed, now or by a falling force; or NEED."""
     level = ints[state + LEVEL]
     if ints[ints[KINDS] + element] != VISCOUS or ints[ints[level + STATES] + element] != OPEN:
         return 0
@@ -129,6 +129,8 @@ def would_pull_if_closed(ints: Ints, numbers: Numbers, waves: Waves, state: int,
     sign = row_sign(ints, numbers, state, signal, mapped_size(ints, numbers, state, signal, 0))
     if sign == 0:
         sign = becomes(ints, numbers, waves, state, signal, 0)
+    if sign > 0:
+        sign = rate_sign(ints, numbers, state, signal)
     return 1 if sign <= 0 else 0
 
 

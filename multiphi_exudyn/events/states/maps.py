@@ -185,9 +185,7 @@ def move(ints: Ints, numbers: Numbers, places: int, speeds: int, level: int, res
         ints, numbers, way, other, ints[places + PLACE], ints[speeds + SPEED], ints[here + MODES] + channels,
         ints[there + MODES] + channels, rows, ints[result + PLACE], ints[result + SPEED], sizes,
     )  # fmt: skip
-    for i in range(
-        ints[level + MODES] + ints[PRESCRIBED], rows
-    ):  # a place taken over where it is zero but for round-off
+    for i in range(ints[level + MODES] + ints[PRESCRIBED], rows):  # a held place that is round-off of its map is zero
         if abs(numbers[ints[result + PLACE] + i]) <= ZERO * numbers[sizes + i]:
             numbers[ints[result + PLACE] + i] = 0.0
     ints[result + LEVEL] = level

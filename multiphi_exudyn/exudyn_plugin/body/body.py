@@ -310,7 +310,9 @@ class MultiPhiBody:
         if interface is not None:  # SolveStatic has the other sign of multipliers
             reactions = -coordinates.direct_reactions(stepped) @ interface.forces
             interface.record_angles()
+            interface.record_static_error(stepped)
         self._record.include_level(level.level)
+        self._record.include_places(level, xi, time)
         self._keep_end()
         return static_changes(self.name, level, xi[:, 0], reactions)
 

@@ -31,6 +31,7 @@ import exudyn as exu
 import numpy as np
 from exudyn.itemInterface import MarkerNodeCoordinates, ObjectConnectorCoordinateVector, SensorObject
 
+from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.exudyn_plugin.coupling.interface_nodes import TURN, InterfaceNode, long_lines
 from multiphi_exudyn.exudyn_plugin.coupling.modal_force import static_shift
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
@@ -40,6 +41,8 @@ from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 
 __all__ = ["Interface", "Visualization"]
+
+STATIC = 0.02  # of the largest displacement of the points: what the modes may leave out of a static solution
 
 Visualization: TypeAlias = Mapping[str, Any]  # show and color of items in the renderer
 
@@ -65,14 +68,16 @@ class Interface:
     """The interface coordinates of one body in one system.
 
     count: m. nodes: NodeIndex by name. sensors: of f, by name. ties: objects of the constraint y = R q + c.
-    largest_angles: in the run [rad], of rigid nodes and of lines between two positions, by their names. max_levels:
-    number of levels of which R and c are kept.
+    largest_angles: in the run [rad], of rigid nodes and of lines between two positions, by their names. static_error:
+    of a static solution, largest share of a displacement that the modes leave out, its node and the number of modes.
+    max_levels: number of levels of which R and c are kept.
     """
 
     def __init__(self, mbs: Any, name: str, nodes: Sequence[InterfaceNode], max_levels: int) -> None:
         self.nodes: dict[str, Any] = {}
         self.sensors: dict[str, Any] = {}
         self.largest_angles: dict[tuple[str, ...], float] = {}
+        self.static_error: tuple[float, str, int] = (0.0, "", 0)
         self._name = name
         self._interface_nodes = tuple(nodes)
         self._rows = np.concatenate([node.rows for node in nodes])
@@ -154,7 +159,7 @@ class Interface:
             (nodes[i].name, nodes[j].name): (np.subtract(nodes[j].position, nodes[i].position), moved[i], moved[j])
             for i, j in self._lines
         }
-        self.largest_angles = dict.fromkeys([*self._angles, *self._vectors], 0.0)
+        self.largest_angles, self.static_error = dict.fromkeys([*self._angles, *self._vectors], 0.0), (0.0, "", 0)
         rows = [self._mbs.systemData.GetObjectLTGAE(tie) for tie in self.ties]
         self.multipliers = np.concatenate(rows).astype(int)
         self._forces = state["AECoords"]
@@ -177,11 +182,39 @@ class Interface:
         for names, (line, start, end) in self._vectors.items():
             largest[names] = max(largest[names], _angle(line, line + end - start))
 
+    def record_static_error(self, stepped: SteppedLevel) -> None:
+        """Keep what the modes leave out of the static response to the forces on the points, f of SolveStatic.
+
+            d = R_0 (y(f) - Psi S^-1 R^T f),   error = max |d_i / l_i| / max |y_i / l_i|,   l_i^2 = R_0i Omega^-2 R_0i^T
+
+        R_0 (m, b) are rows of the points in base coordinates, y(f) (b,) the response of the level without truncation.
+        """
+        level, force = stepped.loaded.modal, -self.forces  # SolveStatic has the other sign of multipliers
+        in_base, modal = self.in_base(level.base), self.map_in(stepped).rows[:, : level.modes]
+        _, whole = level.static_response(force @ in_base, np.zeros(len(level.indices)))
+        left_out = np.abs(in_base @ (whole - level.vectors @ static_shift(level, force @ modal)))
+        lengths = np.sqrt(in_base[:, level.base.modes.rigid :] ** 2 @ level.base.compliance)
+        moved = np.abs(self._views[0][self.indices])
+        flexible = lengths > 0
+        largest = float(np.max(moved[flexible] / lengths[flexible], initial=0.0))
+        if not largest > 0:
+            return
+        shares = np.divide(left_out, lengths * largest, out=np.zeros(len(lengths)), where=flexible)
+        worst = int(np.argmax(shares))
+        node = next(n for n, part in zip(self._interface_nodes, self._slices, strict=True) if worst < part.stop)
+        self.static_error = float(shares[worst]), node.name, level.modes
+
     def warnings(self, is_free: bool) -> Iterator[str]:
         """Warnings of an interface that turns beyond the linear range, or may do so unseen, a sentence each.
 
-        is_free: whether the body can move as a whole.
+        And of what the modes leave out of a static solution. is_free: whether the body can move as a whole.
         """
+        share, name, modes = self.static_error
+        if share > STATIC:
+            yield (
+                f"truncated statics: {modes} modes leave out {per_cent(share)} of the static displacement at {name!r} "
+                f"under the forces on the interface; give the model more modes"
+            )
         limit = f"the body is linear, do not trust it beyond {math.degrees(TURN):g} degrees: make the motion smaller"
         for names, angle in self.largest_angles.items():
             if angle > TURN:

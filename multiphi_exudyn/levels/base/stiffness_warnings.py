@@ -12,15 +12,18 @@ import scipy.sparse
 from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.mathematics.eigenproblems.modes import ROUND_OFF, Modes, round_off_energy
 from multiphi_exudyn.mathematics.eigenproblems.stiffness_digits import (
+    CERTAIN,
     digits_of,
     doubled_product,
     energy_noise,
+    has_soft_ground,
     is_exact,
 )
 
 __all__ = ["stiffness_warnings"]
 
 UNCERTAIN = 1e-3  # of omega^2: what the digits may leave open without a warning
+FEW_UNITS = 0.1  # of omega^2: the same for exact numbers, as so few units of the last bit may be exact by chance
 RESOLVED = 8.0  # times what the digits leave open: assembled free structures have at most 2
 SHAPES = 0.02  # of the energy that counts as round-off: what the round-off of rigid-body shapes stays below
 LOWEST = 8  # elastic modes that are judged: higher ones are stiffer
@@ -44,21 +47,19 @@ def stiffness_warnings(stiffness: Any, modes: Modes) -> Iterator[str]:
     if is_rounded and modes.rigid:
         squares = np.einsum("ij,ij->j", rigid, doubled_product(stiffness, rigid))
         least = np.maximum(RESOLVED * energy_noise(stiffness, rigid), SHAPES * round_off_energy(stiffness, rigid))
-        if np.any(squares > least):
+        if np.any(squares > least) or (np.any(squares > 0) and has_soft_ground(stiffness, rigid)):
             yield (
                 f"digits: a mode of {math.sqrt(np.max(squares)) / 2 / math.pi:.3g} Hz, the difference of far stiffer "
                 "springs, is taken as a rigid-body one, as 16 digits of the stiffness hardly hold it; tie rigidly what "
                 "these springs connect"
             )
     largest = round_off_energy(stiffness, shapes) / ROUND_OFF
-    if digits is None and (
-        np.all(largest * np.finfo(float).eps <= UNCERTAIN * omega**2)
-        or (not scipy.sparse.issparse(stiffness) and is_exact(stiffness))
-    ):
+    if digits is None and np.all(largest * np.finfo(float).eps <= UNCERTAIN * omega**2):
         return
+    are_sums = digits is None and not scipy.sparse.issparse(stiffness) and is_exact(stiffness, CERTAIN)
     shares = energy_noise(stiffness, shapes, digits) / omega**2
     worst = int(np.argmax(shares)) if len(shares) else 0
-    if len(shares) and shares[worst] > UNCERTAIN:
+    if len(shares) and shares[worst] > (FEW_UNITS if are_sums else UNCERTAIN):
         yield (
             f"digits: the stiffness has {'16 digits' if digits is None else digits.name}, which give the frequency "
             f"{omega[worst] / 2 / math.pi:.4g} Hz only to {per_cent(float(shares[worst]) / 2)}, as it is the "

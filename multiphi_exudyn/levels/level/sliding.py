@@ -121,20 +121,27 @@ def with_sliding(plain: Level) -> Level:
     if not sliders:
         return plain
     if plain.neutral.size:
-        raise NumericalFailure(
-            f"level {', '.join(plain.closed)}: negative stiffness cancels that of a mode beside contacts that slide"
-        )
+        raise _cancelled(plain)
     links = [plain.indices[k] for k in sliders]
     added = base.pushes[:, links] - base.directions[:, links]
     reactions = _static_reactions(plain, added)
     _check_unique_motion(plain, sliders, reactions)
     level_fields = {field.name: getattr(plain, field.name) for field in fields(plain)}
     level = SlidingLevel(**level_fields, plain=plain, sliders=sliders, added=added, reactions=reactions)
-    elastic_rows = np.where(
-        plain.squares == 0, 0.0, plain.force_rows
-    )  # round-off of the others would couple rigid-body modes
-    return replace(
+    rigid = np.isinf(base.stiffnesses[list(plain.indices)])
+    is_round_off = rigid[:, None] & (plain.squares == 0)  # of reactions: it would couple rigid-body modes
+    elastic_rows = np.where(is_round_off, 0.0, plain.force_rows)
+    level = replace(
         level, force_rows=level.answered(elastic_rows), force_rate_rows=level.answered(plain.force_rate_rows)
+    )
+    if np.any(level.coupling[:, plain.squares == 0]):
+        raise _cancelled(plain)
+    return level
+
+
+def _cancelled(plain: Level) -> NumericalFailure:
+    return NumericalFailure(
+        f"level {', '.join(plain.closed)}: negative stiffness cancels that of a mode beside contacts that slide"
     )
 
 

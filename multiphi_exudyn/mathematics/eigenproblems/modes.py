@@ -149,7 +149,8 @@ def _with_soft_ones_among_rigid(stiffness: np.ndarray, modes: Modes) -> Modes:
     """Return the modes with a frequency for those without one whose exact strain energy is not zero."""
     own = modes.shapes[:, : modes.rigid]
     squares, rotation = scipy.linalg.eigh(own.T @ doubled_product(stiffness, own))
-    none = NO_ENERGY * np.max(round_off_energy(stiffness, own), initial=0.0)
+    highest = float(modes.omega[-1]) ** 2  # of the modes that the round-off of a shape consists of
+    none = NO_ENERGY * max(ROUND_OFF * highest, np.max(round_off_energy(stiffness, own), initial=0.0))
     if np.any(squares < -none):
         raise _indefinite(float(squares[0]))
     soft = squares > none

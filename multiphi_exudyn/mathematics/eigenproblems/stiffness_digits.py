@@ -22,7 +22,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
-__all__ = ["Digits", "digits_of", "doubled_product", "energy_noise", "is_exact"]
+__all__ = ["CERTAIN", "Digits", "digits_of", "doubled_product", "energy_noise", "has_soft_ground", "is_exact"]
 
 DECIMALS = range(6, 14)  # digits of printed matrices that can be told: with more, every number of 53 bits has them
 DISTINCT = 5  # values at least, as a few springs may have short numbers by chance
@@ -30,8 +30,11 @@ USED = 0.5  # of the values that have a last digit other than zero; of any digit
 LAST = 4  # bits of single precision of which one is not zero
 SAMPLED = 200  # values that tell most matrices of all 53 bits
 INTEGER = 8 * float(np.finfo(float).eps)  # of a value: a remainder below it is round-off of the decimal number
+MOVED = 1e-5  # of the largest displacement of rigid-body modes: smaller ones are round-off
 DEVIATIONS = 4.0  # sigma: the largest error of omega^2
 UNUSED = 4.0  # units of the last bit of the largest entry
+CERTAIN = 8.0  # units: few matrices of rounded numbers are multiples of them by chance
+NEARLY_FREE = 1e-13  # of a row's diagonal entry: larger row sums are springs to the ground without doubt, or gears
 SPLIT = 2.0**27 + 1
 
 
@@ -62,12 +65,12 @@ def digits_of(matrix: Any) -> Digits | None:
     return None
 
 
-def is_exact(matrix: np.ndarray) -> bool:
+def is_exact(matrix: np.ndarray, units: float = UNUSED) -> bool:
     """Return whether all entries are multiples of a few units of the last bit of the largest: sums of exact numbers.
 
     Round-off of smaller entries leaves fractions of it.
     """
-    step = UNUSED * np.spacing(np.max(np.abs(matrix)))
+    step = units * np.spacing(np.max(np.abs(matrix)))
     return bool(np.all(matrix == step * np.round(matrix / step)))
 
 
@@ -83,6 +86,20 @@ def energy_noise(stiffness: Any, shapes: np.ndarray, digits: Digits | None = Non
         sums = np.bincount(groups, factors * shape[upper.row] * shape[upper.col], len(distinct))
         noise[j] = DEVIATIONS * np.linalg.norm(sums * unit) / np.sqrt(12)
     return noise
+
+
+def has_soft_ground(stiffness: np.ndarray, shapes: np.ndarray) -> bool:
+    """Return whether springs (n, n) between coordinates that shapes (n, m) move have soft ones to the ground.
+
+    No entry beside the diagonal is positive, and a row sum is more than the round-off of the additions in it.
+    """
+    diagonal, moved = np.diagonal(stiffness), np.any(np.abs(shapes) > MOVED * np.max(np.abs(shapes)), axis=1)
+    if np.any(stiffness - np.diag(diagonal) > 0):
+        return False
+    sums = doubled_product(stiffness, np.ones((len(stiffness), 1)))[:, 0]
+    additions = np.count_nonzero(stiffness, axis=1)
+    is_soft = (sums > additions * np.spacing(diagonal)) & (sums <= NEARLY_FREE * diagonal)
+    return bool(np.any(is_soft & moved))
 
 
 def doubled_product(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:

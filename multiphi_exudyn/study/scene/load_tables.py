@@ -10,6 +10,7 @@ from pydantic_core import PydanticCustomError
 from multiphi_exudyn.study.scene.fields import Finite, Name, NotNegative, Place, Positive, Table
 
 __all__ = [
+    "AccelerogramCourse",
     "BaseMotionSpec",
     "ConstantLoadSpec",
     "CourseSpec",
@@ -19,6 +20,7 @@ __all__ = [
     "LoadSpec",
     "SampledCourse",
     "SampledLoadSpec",
+    "Samples",
     "StopMotionSpec",
     "SweepCourse",
     "SweepLoadSpec",
@@ -34,21 +36,33 @@ class HarmonicCourse(Table):
     phase: Finite = 0.0  # rad
 
 
-class SampledCourse(Table):
-    """Straight lines between samples, zero outside them; from columns of a CSV file, or as they stand here."""
+class Samples(Table):
+    """Samples from columns of a CSV file, or as they stand here."""
 
-    kind: Literal["sampled"]
     csv: str | None = None  # path, relative to the scene file; time [s] is its first column
     column: Annotated[int, Field(ge=1)] = 1
     time: tuple[Finite, ...] | None = None  # s
     values: tuple[Finite, ...] | None = None
 
     @model_validator(mode="after")
-    def _one_source(self) -> SampledCourse:
+    def _one_source(self) -> Samples:
         inline = self.time is not None and self.values is not None
         if (self.csv is None) != inline or (self.time is None) != (self.values is None):
             raise PydanticCustomError("samples", "either csv, or time and values")
         return self
+
+
+class SampledCourse(Samples):
+    """Straight lines between samples, zero outside them; from columns of a CSV file, or as they stand here."""
+
+    kind: Literal["sampled"]
+
+
+class AccelerogramCourse(Samples):
+    """Motion whose acceleration is factor times samples, in straight lines, zero outside them; at rest before."""
+
+    kind: Literal["accelerogram"]
+    factor: Finite = 1.0  # m/s2 in a unit of the record: 9.81 for a record in g, 0.01 for one in cm/s2
 
 
 class SweepCourse(Table):
@@ -63,8 +77,8 @@ class SweepCourse(Table):
     tolerance: Annotated[float, Field(ge=1e-12, lt=1)] = 1e-6  # of a reduced model's response, of its largest value
 
 
-CourseSpec = Annotated[HarmonicCourse | SampledCourse | SweepCourse, Field(discriminator="kind")]
-SmoothCourse = Annotated[HarmonicCourse | SweepCourse, Field(discriminator="kind")]
+CourseSpec = Annotated[HarmonicCourse | SampledCourse | SweepCourse | AccelerogramCourse, Field(discriminator="kind")]
+SmoothCourse = Annotated[HarmonicCourse | SweepCourse | AccelerogramCourse, Field(discriminator="kind")]
 
 
 class ConstantLoadSpec(Table):
@@ -113,7 +127,7 @@ class BaseMotionSpec(Table):
     """A base that moves; displacements are then relative to it, stops move with it unless they are named."""
 
     kind: Literal["base-motion"]
-    course: SmoothCourse  # z(t) [m], harmonic or sweep
+    course: SmoothCourse  # z(t) [m]: harmonic, sweep or accelerogram
     fixed_stops: tuple[Name, ...] = ()  # contacts whose stops do not move with the base
     direction: Place | None = None  # unit rigid-body motion of the base; a beam knows its own
 

@@ -13,12 +13,13 @@ import numpy as np
 
 from multiphi_exudyn.mechanics.loads.loads import HarmonicLoad, Load, SampledLoad, SweepLoad
 from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion
-from multiphi_exudyn.mechanics.loads.samples import Sampled
+from multiphi_exudyn.mechanics.loads.samples import Accelerogram, Sampled
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.loads.time_functions import Harmonic, Sweep, TimeFunction
 from multiphi_exudyn.mechanics.structures.structure import At
 from multiphi_exudyn.study.scene.fields import inside, place_phrase
 from multiphi_exudyn.study.scene.load_tables import (
+    AccelerogramCourse,
     BaseMotionSpec,
     ConstantLoadSpec,
     CourseSpec,
@@ -27,6 +28,7 @@ from multiphi_exudyn.study.scene.load_tables import (
     LoadSpec,
     SampledCourse,
     SampledLoadSpec,
+    Samples,
     StopMotionSpec,
     SweepCourse,
 )
@@ -76,10 +78,13 @@ def _along(scene: Scene, field: str, own: Direction | None, transverse: np.ndarr
 def _course(scene: Scene, field: str, spec: CourseSpec) -> Any:
     if isinstance(spec, SampledCourse):
         return _samples(scene, field, spec)
+    if isinstance(spec, AccelerogramCourse):
+        samples = _samples(scene, field, spec)
+        return Accelerogram(samples.time, samples.values, spec.factor)
     return COURSES[spec.kind](**spec.model_dump(exclude={"kind"}))
 
 
-def _samples(scene: Scene, field: str, spec: SampledCourse) -> Sampled:
+def _samples(scene: Scene, field: str, spec: Samples) -> Sampled:
     if spec.csv is None:
         return inside(f"{scene.path}: {field}", lambda: Sampled(spec.time, spec.values))  # type: ignore[arg-type]
     return inside(f"{scene.path}: {field}", lambda: Sampled.from_csv(scene.path.parent / str(spec.csv), spec.column))
@@ -90,18 +95,29 @@ def _phrase(spec: LoadSpec) -> str:
         return f"a weight of {spec.acceleration:+g} m/s²"
     if isinstance(spec, BaseMotionSpec):
         exceptions = f", which {' and '.join(spec.fixed_stops)} does not follow" if spec.fixed_stops else ""
-        return f"a base that moves by {_course_phrase(spec.course, 'm')}{exceptions}"
+        return f"a base {_motion_phrase(spec.course)}{exceptions}"
     if isinstance(spec, StopMotionSpec):
-        return f"a stop of {spec.contact} that moves by {_course_phrase(spec.course, 'm')}"
+        return f"a stop of {spec.contact} {_motion_phrase(spec.course)}"
     if isinstance(spec, ConstantLoadSpec):
         return f"a constant force of {spec.force:+g} N at {place_phrase(spec.at)}"
     return f"a force at {place_phrase(spec.at)} of {_course_phrase(spec, 'N')}"
 
 
-def _course_phrase(spec: CourseSpec, unit: str) -> str:
+def _course_phrase(spec: HarmonicCourse | SampledCourse | SweepCourse, unit: str) -> str:
     if isinstance(spec, HarmonicCourse):
         return f"{spec.amplitude:g} {unit}, harmonic at {spec.frequency_hz:g} Hz"
     if isinstance(spec, SweepCourse):
         span = f"{spec.start_hz:g} to {spec.end_hz:g} Hz in {spec.duration:g} s"
         return f"{spec.amplitude:g} {unit}, swept from {span} ({spec.law})"
+    return _sample_phrase(spec)
+
+
+def _motion_phrase(spec: CourseSpec) -> str:
+    """How a base or a stop moves."""
+    if isinstance(spec, AccelerogramCourse):
+        return f"that accelerates by {spec.factor:g} m/s² times {_sample_phrase(spec)}"
+    return f"that moves by {_course_phrase(spec, 'm')}"
+
+
+def _sample_phrase(spec: Samples) -> str:
     return f"samples from {spec.csv}" if spec.csv else f"{len(spec.time or ())} samples"

@@ -12,7 +12,7 @@ import numpy as np
 from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 from multiphi_exudyn.mechanics.loads.loads import FunctionLoad, Load, SweepLoad
 from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion, StopsMotion
-from multiphi_exudyn.mechanics.loads.samples import Sampled
+from multiphi_exudyn.mechanics.loads.samples import Accelerogram, Sampled
 from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
 from multiphi_exudyn.mechanics.loads.time_functions import Harmonic, Smooth, Sweep, TimeFunction
 from multiphi_exudyn.mechanics.structures.structure import LinearStructure
@@ -40,6 +40,8 @@ def value_at(course: TimeFunction, times: np.ndarray) -> np.ndarray:
     """u (k,) at times (k,) [s]."""
     if isinstance(course, Harmonic):
         return np.asarray(course.amplitude * np.cos(2 * np.pi * course.frequency_hz * times + course.phase))
+    if isinstance(course, Accelerogram):
+        return course.displacement(times)
     if isinstance(course, Sampled):
         return np.interp(times, course.time, course.values, left=0.0, right=0.0)
     if isinstance(course, Sweep):

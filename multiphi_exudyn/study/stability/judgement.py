@@ -1,6 +1,7 @@
 """Judgement of a native trajectory: energy, contact law, events; and when it is wrong.
 
     laws        what must hold of every run, along its analytic segments (run_laws.py): ledger, energy, missed contacts
+                and at a few instants, from what it tells (law_check.py): motion, contact, friction, impacts, energy
     residual    |initial + work - losses - final| / E     E the largest energy of the run
     energy      by how much energy less the work of constant loads rises, over E; where others do any, the residual
     beyond      how far a contact is from its law [m]:

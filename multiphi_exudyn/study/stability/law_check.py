@@ -25,7 +25,7 @@ Every bound is relative to the absolute values of the terms that are summed.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -72,6 +72,7 @@ def broken_laws(
     start: tuple[np.ndarray, np.ndarray] | None = None,
     intervals: int = INTERVALS,
     seed: int = 0,
+    exact: float = EXACT,
 ) -> list[str]:
     """The laws that a run breaks, one sentence each with an instant and by how much; empty if it obeys all.
 
@@ -87,6 +88,8 @@ def broken_laws(
         How many short intervals within segments are looked at.
     seed : int
         Of the random instants.
+    exact : float
+        Share of the terms of a force or a velocity above which a deviation is no round-off.
 
     Returns
     -------
@@ -95,11 +98,10 @@ def broken_laws(
     """
     if not trajectory.segments:
         return []
-    run = _Run(trajectory, tuple(loads), start)
+    run = _Run(trajectory, tuple(loads), start, exact)
     inside = run.inside(intervals, np.random.default_rng(seed))
     found: list[str] = []
     if inside is not None:
-        object.__setattr__(inside, "terms", _force_terms(run, inside))
         for check in (_motion, _derivatives, _contacts, _impulses_of_forces, _frictions, _laws):
             found += check(run, inside)
     return [*found, *_instants(run), *_energies(run, inside)]
@@ -109,9 +111,10 @@ def broken_laws(
 class _Inside:
     """Intervals (k, 2) [s] within segments, their Gauss nodes times (k * NODES,) and weights, and there x, x', x''.
 
-    contact, friction: N or -F, and T (k * NODES,) by names. terms: absolute ones of the equation of motion.
+    contact, friction: N or -F, and T (k * NODES,) by names.
     """
 
+    run: _Run
     ends: np.ndarray
     times: np.ndarray
     weights: np.ndarray
@@ -122,7 +125,11 @@ class _Inside:
     v_ends: np.ndarray
     contact: dict[str, np.ndarray]
     friction: dict[str, np.ndarray]
-    terms: np.ndarray = field(init=False)
+
+    @cached_property
+    def terms(self) -> np.ndarray:
+        """Absolute terms (n, k * NODES) of the equation of motion over the roots of the masses (``_force_terms``)."""
+        return _force_terms(self.run, self)
 
     def worst(self, values: np.ndarray) -> np.ndarray:
         """Largest absolute value (..., k * NODES) on the interval of every node, its ends not included."""
@@ -138,14 +145,18 @@ class _Run:
     """A trajectory with what it was given: matrices, rows and forces."""
 
     def __init__(
-        self, trajectory: Trajectory, loads: tuple[Load, ...], start: tuple[np.ndarray, np.ndarray] | None
+        self,
+        trajectory: Trajectory,
+        loads: tuple[Load, ...],
+        start: tuple[np.ndarray, np.ndarray] | None,
+        exact: float,
     ) -> None:
         self.trajectory, self.loads, self.start = trajectory, loads, start
         self.structure, self.elements = trajectory.model.structure, trajectory.model.contacts
         self.mass, self.stiffness = self.structure.mass, self.structure.stiffness
         self._kept: dict[tuple[int, ...], np.ndarray] = {}
         self.root = np.sqrt(np.asarray(self.mass.diagonal(), float))[:, None]
-        self.exact = INTERPOLATED if approximated(loads) else EXACT
+        self.exact = max(exact, INTERPOLATED) if approximated(loads) else exact
         self.complete = trajectory.model.level(()).modes >= self.structure.n
         self.contacts = [element for element in self.elements if isinstance(element, UnilateralContact)]
         self.frictions = [element for element in self.elements if isinstance(element, Friction)]
@@ -194,6 +205,11 @@ class _Run:
         near = np.abs(even[:, None] - np.concatenate(chosen)) < SHORTEST * run.t_end  # an event by round-off after it
         times = np.unique(np.concatenate([even[~np.any(near, axis=1)], *chosen]))
         return times[times < run.t_end]
+
+    @property
+    def has_both_sides(self) -> np.ndarray:
+        """Whether (k,) both sides of the instants are known: not of the first one where the start is not given."""
+        return (self.instants > self.trajectory.t_start) | (self.start is not None)
 
     @cached_property
     def x_sides(self) -> tuple[np.ndarray, np.ndarray]:
@@ -301,6 +317,7 @@ class _Run:
         times = (ends.mean(axis=1)[:, None] + half * nodes).ravel()
         contacts = [element.name for element in self.pressing]
         return _Inside(
+            run=self,
             ends=ends,
             times=times,
             weights=(half * weights).ravel(),
@@ -578,7 +595,7 @@ def _rebounds(run: _Run, contact: UnilateralContact, impulse: np.ndarray, alone:
     _, z_rate = run.stop(contact, times)
     arriving, leaving = (row @ v - z_rate for v in run.v_sides)
     round_off = run.exact * (run.speed * np.sum(scaled) + np.abs(z_rate)) + run.smallest_bounce * np.sum(scaled)
-    into = np.where(_touches(run, contact), -leaving, 0.0)
+    into = np.where(_touches(run, contact) & run.has_both_sides, -leaving, 0.0)
     found = _told(f"{name} goes on into its stop", into, round_off, times, "velocities")
     judged = alone & (impulse * (scaled @ scaled) > round_off)
     if not contact.further:

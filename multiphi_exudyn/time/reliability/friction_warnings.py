@@ -37,10 +37,10 @@ from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 from multiphi_exudyn.mechanics.elements.element import friction_spring
 from multiphi_exudyn.time.segments.segment import Segments
 
-__all__ = ["friction_warnings"]
+__all__ = ["TOUCHING", "friction_warnings"]
 
 SPEED_ROUND_OFF = 1e-9  # of the largest speed: a smaller one against the slip is round-off
-TOUCHES = 1e-10  # of the largest terms of its gap: a contact touches
+TOUCHING = 1e-10  # of the largest terms of its gap: a contact touches
 BACKWARDS = 0.01  # of the time in slip: a smaller share against the slip gives no warning
 REMEDY = "give one element with the sum of their limits, or each a spring (stiffness, tangential_stiffness)"
 
@@ -88,7 +88,8 @@ def _touching(segments: Segments, place: int, contacts: Sequence[int]) -> list[i
     xi = segments.states(np.array([place]), np.array([after]))[0, 0, : level.width]
     rows, constants = level.level.gap_rows[contacts], level.gap_constants[contacts]
     sizes = np.abs(rows) @ np.abs(xi) + np.abs(constants)
-    return [i for i, is_near in zip(contacts, np.abs(rows @ xi + constants) <= TOUCHES * sizes, strict=True) if is_near]
+    touches = np.abs(rows @ xi + constants) <= TOUCHING * sizes
+    return [i for i, is_touching in zip(contacts, touches.tolist(), strict=True) if is_touching]
 
 
 def _relieved(base: ModalBase, contact: int, closed: Sequence[int], idle: Sequence[int]) -> list[int]:

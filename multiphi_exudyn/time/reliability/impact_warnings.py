@@ -28,6 +28,7 @@ from multiphi_exudyn.events.transitions.state import event_table
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.complementarity.coulomb_impacts import CoulombImpact
 from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
+from multiphi_exudyn.time.reliability.friction_warnings import TOUCHING
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["impact_warnings", "is_taking", "mesh_warnings", "spread_contacts"]
@@ -35,7 +36,6 @@ __all__ = ["impact_warnings", "is_taking", "mesh_warnings", "spread_contacts"]
 TAKEN = 0.005  # of the largest energy of a run, by impacts on what the mesh decides
 SPREAD = 0.3  # of an effective mass' reciprocal: on meshes the upper half of the modes has .38 to .67, on chains .2
 FEWEST = 6  # modes of which this can be told
-TOUCHING = 1e-10  # of the largest terms of its gap: a contact touches
 REMEDY = "smaller coefficients of friction, or a finite stiffness, leave one"
 
 

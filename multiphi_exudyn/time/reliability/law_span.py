@@ -14,9 +14,10 @@ from scipy.optimize import brentq
 
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
+from multiphi_exudyn.time.segments.segment import Segments
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
-__all__ = ["laws_at_an_end", "span_warnings"]
+__all__ = ["LawPlaces", "law_times", "laws_at_an_end", "span_warnings"]
 
 BEYOND = 1e-9  # of the span's width: a law is not left by less
 FEWEST, PER_PERIOD = 9, 8  # samples of a segment of the motion, and of a period of its level's highest frequency
@@ -40,9 +41,9 @@ def span_warnings(trajectory: Trajectory) -> Iterator[str]:
 
 def _left_span(trajectory: Trajectory, law: ForceLaw) -> Iterator[str]:
     low, high = float(law.knots[0]), float(law.knots[-1])
-    times = _samples(trajectory, law)
+    times = law_times(trajectory.segments, trajectory.model.index(law.name), law)
     places = law.centre + np.asarray(trajectory.gap(law.name, times))
-    beyond = np.maximum(places - high, low - places) / (high - low)
+    beyond = _beyond(law, places)
     if not np.any(beyond > BEYOND):
         return
     first = int(np.argmax(beyond > BEYOND))
@@ -51,20 +52,55 @@ def _left_span(trajectory: Trajectory, law: ForceLaw) -> Iterator[str]:
     if first > 0 and beyond[first - 1] <= 0:
         edge = high if places[first] > high else low
         time = brentq(lambda t: law.centre + float(trajectory.gap(law.name, t)) - edge, times[first - 1], times[first])
-    how = "leaves" if first else "starts outside"
-    yield (
-        f"law span: force law {law.name!r} {how} its span ({low:g}, {high:g}) at t = {time:.6g} s and reaches "
-        f"{places[farthest]:.6g} at t = {times[farthest]:.6g} s, where its last segment is continued; give it a span "
-        "that holds the motion, or end the run before"
+    yield _sentence(law, "leaves" if first else "starts outside", time, places[farthest], times[farthest])
+
+
+def _beyond(law: ForceLaw, places: np.ndarray) -> np.ndarray:
+    """Return how far places (k,) are beyond a law's span, in widths of it; negative inside."""
+    low, high = float(law.knots[0]), float(law.knots[-1])
+    return np.asarray(np.maximum(places - high, low - places) / (high - low))
+
+
+def _sentence(law: ForceLaw, how: str, time: float, farthest: float, when: float) -> str:
+    return (
+        f"law span: force law {law.name!r} {how} its span ({law.knots[0]:g}, {law.knots[-1]:g}) at t = {time:.6g} s "
+        f"and reaches {farthest:.6g} at t = {when:.6g} s, where its last segment is continued; give it a span that "
+        "holds the motion, or end the run before"
     )
 
 
-def _samples(trajectory: Trajectory, law: ForceLaw) -> np.ndarray:
-    """Return times at which a law is in a last segment, in order."""
-    segments, index = trajectory.segments, trajectory.model.index(law.name)
+class LawPlaces:
+    """Places of force laws beyond their spans in a run whose motion is not kept, each with its time."""
+
+    def __init__(self) -> None:
+        self._left: dict[str, tuple[ForceLaw, float, float, float, float]] = {}
+
+    def include(self, law: ForceLaw, times: np.ndarray, places: np.ndarray) -> None:
+        """Include places (k,) at ascending times (k,) [s]; the time of leaving is interpolated between two of them."""
+        beyond = _beyond(law, places)
+        if not np.any(beyond > BEYOND):
+            return
+        k, i = int(np.argmax(beyond)), int(np.argmax(beyond > BEYOND))
+        first = float(np.interp(0.0, beyond[i - 1 : i + 1], times[i - 1 : i + 1]) if i else times[0])
+        _, earlier, most, place, when = self._left.get(law.name, (law, first, -math.inf, 0.0, 0.0))
+        if beyond[k] > most:
+            most, place, when = float(beyond[k]), float(places[k]), float(times[k])
+        self._left[law.name] = law, min(first, earlier), most, place, when
+
+    @property
+    def warnings(self) -> Iterator[str]:
+        """A warning of every law that was seen beyond its span, with the first time and the farthest place."""
+        for law, first, _, place, when in self._left.values():
+            yield _sentence(law, "leaves", first, place, when)
+
+
+def law_times(segments: Segments, index: int, law: ForceLaw) -> np.ndarray:
+    """Return times (k,) [s] at which a law, the ``index``-th element, is in a last segment, in order."""
     is_last = np.array([law.is_last(level.states[index]) for level in segments.levels])
     fastest = np.array([level.modal.highest_frequency for level in segments.levels])
     chosen = np.flatnonzero(is_last[segments.numbers])
+    if not len(chosen):
+        return np.zeros(0)
     starts, ends = segments.starts[chosen], segments.ends[chosen]
     counts = np.ceil(PER_PERIOD * fastest[segments.numbers[chosen]] * (ends - starts)) + FEWEST
     share = min(1.0, MOST / float(np.sum(counts)))

@@ -28,8 +28,9 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "slow mode: ..."          a mode whose equilibrium lies so far away that digits of the motion are lost
     "load pieces: ..."        loads of so many samples or pieces that the run takes long
     "coarse steps: ..."       steps of Exudyn that delay the motion of modes not matched to them
-    "turning: ..."            a body in Exudyn that turns beyond the linear range, or may do so unseen; a rigid
-    "rigid interface ...:"    interface of it that does
+    "truncated statics: ..."  what the modes leave out of a static solution of Exudyn under forces on a body's interface
+    "turning: ..."            a body in Exudyn that turns beyond the linear range, or may do so unseen
+    "rigid interface ...: "   a rigid interface of a body that turns beyond the linear range
     "slow model: ..."         modes that hardly begin to move in the run: matrices swapped, or units mixed
 """
 
@@ -52,7 +53,7 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.time.loop.verdict import lost_share
 from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
 from multiphi_exudyn.time.reliability.impact_warnings import impact_warnings, is_taking, mesh_warnings, spread_contacts
-from multiphi_exudyn.time.reliability.law_span import laws_at_an_end, span_warnings
+from multiphi_exudyn.time.reliability.law_span import LawPlaces, laws_at_an_end, span_warnings
 from multiphi_exudyn.time.reliability.law_warnings import approximated_laws, law_warnings
 from multiphi_exudyn.time.reliability.ledger_warnings import ledger_warnings
 from multiphi_exudyn.time.reliability.truncation_warnings import energy_warning, truncation_warnings, verdict_of
@@ -82,7 +83,8 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     """Warnings of a run, one sentence each; tolerance: the one that decided its modes.
 
     All warnings but those of the ledger and of truncation are the same for runs of one length in the same levels, and
-    are cached for them, unless friction, a force law, a slow mode or the model's own check needs the motion of each.
+    are cached for them, unless friction, a force law that is approximated or at an end of its span, a slow mode, or the
+    model's own check needs the motion of every run.
     """
     record, model = trajectory.ending.record, trajectory.model
     visited, cache = record.visited, record.arrays.levels.told
@@ -104,7 +106,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     if tolerance is not None or not (share >= 0 and error >= 0):
         share, error = verdict_of(trajectory, tolerance)
     if tolerance is None and not (share > 0 or error > 0):
-        return advised((*before, *after), tolerance)
+        return (*before, *after)
     struck = general.rigid and error > 0 and _struck(trajectory)
     return advised((*before, *truncation_warnings(model, (share, error), tolerance, struck), *after), tolerance)
 
@@ -146,8 +148,7 @@ class ModelWarnings:
             spread_contacts(model),
             model.general
             or model.validity is not None
-            or bool(approximated_laws(model))
-            or bool(laws_at_an_end(model, [v.states for v in loaded])),
+            or bool(approximated_laws(model) or laws_at_an_end(model, [v.states for v in loaded])),
             (*digit_warnings(model), *damping_warnings(model), *missing_modes(model), *static),
             tuple(cluster_warnings(levels)),
             fastest,
@@ -192,12 +193,13 @@ class RunSummary:
     """Summary of a run of a body in Exudyn, which keeps no segments.
 
     levels: visited levels, each once. truncated: energy [J] lost to truncation at the start and at all events.
-    energy: largest sampled kinetic and strain energy of the run [J].
+    energy: largest sampled kinetic and strain energy of the run [J]. places: of force laws beyond their spans.
     """
 
     levels: Sequence[Level]
     truncated: float
     energy: float
+    places: LawPlaces
 
 
 def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
@@ -206,6 +208,7 @@ def warnings_of_body(model: MultiPhiModel, run: RunSummary) -> tuple[str, ...]:
     if not model.whole:
         sentences.extend(static_warnings(run.levels))
         sentences.extend(energy_warning(lost_share(abs(run.truncated), run.energy)))
+    sentences.extend(run.places.warnings)
     return tuple(sentences)
 
 

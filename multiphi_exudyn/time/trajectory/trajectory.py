@@ -74,8 +74,9 @@ class Trajectory(ModelHistories):
         The static load in base coordinates.
     warnings : tuple of str
         What to distrust in this result and what to do about it, one sentence each that begins with its kind and a
-        colon: open ledger, truncated contact, truncated friction, lost energy, truncation, undamped modes, damping
-        ratios, missing modes, linear range, cluster, base, load pieces.
+        colon: open ledger, truncated contact, truncated friction, backward slip, redundant contacts, redundant
+        friction, friction in turn, force law, mesh impacts, several impacts, truncation, lost energy, digits, undamped
+        modes, damping ratios, law span, missing modes, linear range, cluster, base, slow mode, load pieces, slow model.
     again : callable
         Function that repeats the run from other y, y' (m,) and with changed gaps, without warnings.
 
@@ -214,7 +215,7 @@ class Trajectory(ModelHistories):
         the motion need not have, fixed and random in all coordinates; and +-1e-10 of the gaps and of the motion there.
         The distance is that of y, in the norm of the mass matrix, relative to the largest |y| of the run, and for one
         at rest to the smallest gap. The horizon is t_end where the distance never exceeds the tolerance, and no later
-        than the end of a perturbed run that fails. Costs six more runs.
+        than the end of a perturbed run that fails. Costs six more runs, four without contacts or for a continued run.
 
         Parameters
         ----------

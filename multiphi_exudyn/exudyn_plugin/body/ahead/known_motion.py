@@ -16,7 +16,9 @@ from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.transitions.state import Event, Phase, State
 from multiphi_exudyn.levels.level.level import Level
+from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
 from multiphi_exudyn.time.record.recorded_segments import Recorded
+from multiphi_exudyn.time.reliability.law_span import law_times
 from multiphi_exudyn.time.run.motion import Motion
 from multiphi_exudyn.time.segments.segment import Segments
 
@@ -98,6 +100,21 @@ class MotionInterval:
         """Levels entered up to a time [s]."""
         for number in set(self.segments.numbers[self.segments.starts <= until].tolist()):
             yield self.static_levels.level(self.segments.levels[number].states).level
+
+    def law_states(self, until: float) -> Iterator[tuple[LoadedLevel, np.ndarray, np.ndarray]]:
+        """Levels with a force law in a last segment, coordinates (r, k) in them and times (k,) up to a time [s]."""
+        elements = self.segments.levels[0].level.base.contacts
+        laws = [(i, law) for i, law in enumerate(elements) if isinstance(law, ForceLaw)]
+        if not laws:
+            return
+        sampled = np.unique(np.concatenate([law_times(self.segments, i, law) for i, law in laws]))
+        times = sampled[sampled <= until]
+        owners = self.segments.owners(times)
+        states = self.segments.states(owners, times - self.segments.starts[owners])
+        numbers = self.segments.numbers[owners]
+        for number in np.unique(numbers).tolist():
+            in_level, level = numbers == number, self.segments.levels[number]
+            yield level, states[0, in_level, : level.level.modes].T, times[in_level]
 
     def largest_energy(self, until: float) -> float:
         """Largest kinetic plus strain energy [J] of the states in which segments begin up to a time [s]."""

@@ -78,6 +78,8 @@ class RunAhead:
         """Bring the record up to date, and return the energy [J] that truncation has removed so far."""
         for level in self._interval.levels(self.time):
             self._record.include_level(level)
+        for states in self._interval.law_states(self.time):
+            self._record.include_places(*states)
         if not self._body.own_loads.loaded_levels.isolated:
             self._record.include_energy(self._interval.largest_energy(self.time))
         return self._truncated + float(np.sum(self._interval.truncated[: self._event_count]))

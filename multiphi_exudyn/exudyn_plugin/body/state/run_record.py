@@ -1,26 +1,17 @@
-"""Record of a run in Exudyn: levels and energies, from which the warnings of a body are derived (run_warnings.py).
-
-For modes that are not matched to a step h, the trapezoidal rule lowers the frequency: after a time t the phase lags by
-
-    (omega - (2/h) arctan(omega h/2)) t,   about omega t (omega h)^2 / 12
-"""
+"""Record of a run in Exudyn: levels and energies, from which the warnings of a body are derived (run_warnings.py)."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
-
 import numpy as np
 
+from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import Loss, State
 from multiphi_exudyn.levels.level.level import Level
+from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
+from multiphi_exudyn.time.reliability.law_span import LawPlaces
 from multiphi_exudyn.time.reliability.run_warnings import RunSummary
 
 __all__ = ["RunRecord"]
-
-FINE = 20.0  # steps in the shortest kept period: on the cantilever of the examples fewer err by more than 1 %
-LAG = 0.05  # rad: of the slowest mode at the end of a run
-FAST = math.pi  # rad: omega h of the fastest mode that can be matched to the step
 
 
 class RunRecord:
@@ -30,6 +21,7 @@ class RunRecord:
         self._levels: dict[tuple[int, ...], Level] = {}
         self._truncated = _truncated(lost)
         self._energy = 0.0
+        self._places = LawPlaces()
         self.include_state(start, lost.total)
 
     def include_state(self, state: State, lost: float = 0.0) -> None:
@@ -41,32 +33,22 @@ class RunRecord:
         """Include a level."""
         self._levels.setdefault(level.indices, level)
 
+    def include_places(self, level: LoadedLevel, xi: np.ndarray, times: np.ndarray) -> None:
+        """Include the places of force laws in a last segment, at coordinates (r, k) of a level at times (k,) [s]."""
+        for i, law in enumerate(level.level.base.contacts):
+            if isinstance(law, ForceLaw) and law.is_last(level.states[i]):
+                gaps = level.level.gap_rows[i] @ xi + level.gap_constants[i]
+                self._places.include(law, times, law.centre + gaps)
+
     def include_energy(self, energy: float) -> None:
         """Include an energy [J] in the largest one."""
         self._energy = max(self._energy, energy)
 
     def summary(self, lost: Loss, truncated: float) -> RunSummary:
         """Summary of the run; lost: at events, truncated: at events that ``lost`` does not contain [J]."""
-        return RunSummary(tuple(self._levels.values()), self._truncated + _truncated(lost) + truncated, self._energy)
-
-    def coarse_step_warning(self, step: float, duration: float) -> Iterator[str]:
-        """Warning of modes that are not matched to steps of this length in a run of this duration [s]."""
-        omega = np.concatenate([level.omega[level.squares > 0] for level in self._levels.values()] or [np.zeros(0)])
-        if not len(omega):
-            return
-        slowest, fastest = float(np.min(omega)), float(np.max(omega))
-        count, lag = 2 * math.pi / (fastest * step), (slowest - 2 / step * math.atan(slowest * step / 2)) * duration
-        needed = step * min(count / FINE, math.sqrt(LAG / lag) if lag > LAG else 1.0)
-        matched = f"give matchedStepSize={step:g}"
-        if fastest * step >= FAST:
-            matched = f"take steps shorter than {FAST / fastest:.3g} s and give this length as matchedStepSize"
-        if count < FINE:
-            found = f"{count:.3g} steps of {step:g} s in the shortest kept period ({2 * math.pi / fastest:.3g} s)"
-        elif lag > LAG:
-            found = f"steps of {step:g} s delay the slowest mode by {lag:.2g} rad in {duration:g} s"
-        else:
-            return
-        yield f"coarse steps: {found}, and modes not matched to them; {matched}, or take steps of {needed:.2g} s"
+        return RunSummary(
+            tuple(self._levels.values()), self._truncated + _truncated(lost) + truncated, self._energy, self._places
+        )
 
 
 def _truncated(loss: Loss) -> float:

@@ -23,6 +23,7 @@ from multiphi_exudyn.exudyn_plugin.body.stepping.exact_step import BodyInStep, S
 from multiphi_exudyn.exudyn_plugin.body.stepping.own_loads import OwnLoads
 from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import ExactMotion
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
+from multiphi_exudyn.time.reliability.law_span import laws_at_an_end
 
 __all__ = ["StepwiseRun"]
 
@@ -65,11 +66,8 @@ class StepwiseRun:
     def is_step_clear(self) -> Callable[[float], int]:
         """Function of the end of a step [s]: nonzero if no event can have occurred in the step."""
         interface = self._body.coordinates.interface
-        return (
-            self._record_angles_and_test
-            if interface is not None and interface.shows_rotations
-            else self._test.is_step_clear
-        )
+        is_watched = self._is_at_end or (interface is not None and interface.shows_rotations)
+        return self._watch_and_test if is_watched else self._test.is_step_clear
 
     def is_step_end(self, t: float) -> bool:
         """Whether a step of this length ends at t [s]."""
@@ -99,6 +97,7 @@ class StepwiseRun:
         if not self._test.is_step_clear(t):
             self._repeat(mbs, t)
             self._begin(t, self._body.coordinates.copy_state())
+        self._record_laws(t)
 
     def restart_step(self) -> None:
         """Take the present state as the start of the next step."""
@@ -133,13 +132,45 @@ class StepwiseRun:
         channels = (self._loads.channels_at(time),) if self._loads.varies else ()
         self._test.begin(time, np.concatenate([x, self.state.held, *channels]), armed)
 
-    def _record_angles_and_test(self, t: float) -> int:
-        """``is_step_clear`` of a body whose interface shows how it turns, which is recorded."""
-        assert self._body.coordinates.interface is not None
-        self._body.coordinates.interface.record_angles()
-        return self._test.is_step_clear(t)
+    def _watch_and_test(self, t: float) -> int:
+        """``is_step_clear`` of a body whose turning, or a force law in a last segment, is recorded."""
+        if self._body.coordinates.interface is not None:
+            self._body.coordinates.interface.record_angles()
+        is_clear = self._test.is_step_clear(t)
+        if is_clear:
+            self._record_laws(t)
+        return is_clear
+
+    def _record_laws(self, t: float) -> None:
+        """Record the places of force laws at t [s] if one in a last segment may be beyond its span."""
+        if not self._is_at_end:
+            return
+        coordinates = self._body.coordinates
+        stepped, times = coordinates.stepped, np.array([t])
+        q = coordinates.views[0][: stepped.modes]
+        if not self._loads.varies and np.abs(self._span_rows.dot(q) + self._span_offsets).max() <= 1.0:
+            return
+        level, xi, _ = self._loads.level_coordinates(
+            stepped, q[:, None], 0 * q[:, None], self.state.held[:, None], times
+        )
+        self._record.include_places(level, xi, times)
+
+    def _prepare_spans(self) -> None:
+        """Prepare the places of force laws in a last segment, -1 to 1 inside their spans, for constant loads."""
+        laws = laws_at_an_end(self._body.model, [self.state.states])
+        self._is_at_end = bool(laws)
+        if not laws or self._loads.varies:
+            return
+        level, r = self._loads.loaded_levels.level(self.state.states), self._body.coordinates.stepped.modes
+        indices = [self._body.model.index(law.name) for law in laws]
+        ends = np.array([[law.knots[0], law.knots[-1]] for law in laws])
+        middles, halves = np.mean(ends, axis=1), np.diff(ends, axis=1)[:, 0] / 2
+        rows, centres = level.level.gap_rows[indices], np.array([law.centre for law in laws])
+        places = centres + level.gap_constants[indices] + rows[:, r:] @ self.state.held
+        self._span_rows, self._span_offsets = rows[:, :r] / halves[:, None], (places - middles) / halves
 
     def _choose_test(self) -> None:
+        self._prepare_spans()
         self._test = self._tests.get_or_build(self.state.states, self._new_test)
 
     def _new_test(self) -> StepTest:

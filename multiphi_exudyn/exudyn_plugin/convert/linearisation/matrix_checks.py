@@ -99,7 +99,9 @@ def _check_positive(mbs: Any, mass: np.ndarray, basis: np.ndarray) -> None:
         share = values[0] / values[-1] if values[-1] > 0 else 0.0
         raise MultiPhiValueError(
             f"mass: got {_kind(values[0], values[-1])} mass at {where} ({share:.1g} of the largest), "
-            f"need more than {MASSLESS:g} of the largest, or a constraint that holds this coordinate"
+            f"need more than {MASSLESS:g} of the largest, as by a small mass there (a millionth of its neighbours' "
+            "changes the motion by as little), or a constraint that holds this coordinate; matrices alone are "
+            "condensed exactly by condensed_structure(M, K), M, K, C = mbs.ComputeLinearizedSystem()"
         )
 
 
