@@ -187,6 +187,13 @@ class TestRefusals:
         with pytest.raises(mp.MultiPhiValueError, match=r"lower rank, 1 .* row 1, "):
             mp.MultiPhiModel(sparse).level(())
 
+    @pytest.mark.parametrize("diagonal", [[1.0, -1.0, 1.0], [0.0, 0.0, 0.0]])
+    def test_what_cannot_be_condensed_is_not_sent_back(self, diagonal):
+        for build in (mp.condensed_structure, mp.LinearStructure):
+            with pytest.raises(mp.MultiPhiValueError, match="mass") as error:
+                build(np.diag(diagonal), CHAIN)
+            assert "condensed_structure" not in str(error.value)
+
     @pytest.mark.parametrize("kind", KINDS)
     def test_an_indefinite_mass_is_not_condensed(self, kind):
         mass = np.array([[1.0, 1.1], [1.1, 1.0]])

@@ -94,6 +94,13 @@ class TestAbaqus:
             assert_allclose(found.condensed(np.eye(6)[third])[5], 1 / 3, rtol=1e-12)
         assert_allclose(read_structure(*files).transformation.toarray()[5], [0, 0, 1 / 3, 0, 1 / 3], rtol=1e-12)
 
+    def test_a_size_with_a_point_is_a_size_or_refused(self, saved):
+        entries = "1 1 2\n2 2 2\n3 3 2\n"
+        found = read_array("mass", saved("m.mtx", "3 3 3.0\n" + entries))
+        assert_array_equal(found.toarray(), 2 * np.eye(3))
+        with pytest.raises(ValueError, match=r"'3 3 3.0', which may be a size or an entry"):
+            read_array("mass", saved("m.mtx", "3 3 3.0\n1 1 2\n2 2 2\n1 3 2\n"))
+
     def test_files_with_and_without_nodes_do_not_mix(self, saved, refused):
         files = saved("j_MASS1.mtx", coordinate(MASS)), saved("j_STIF1.mtx", nodal(STIFFNESS))
         refused(ValueError, "mass: got a file without nodes", read_structure, *files)

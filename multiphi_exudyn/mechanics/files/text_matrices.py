@@ -90,7 +90,7 @@ def _begins_with_size(line: str, table: np.ndarray) -> bool:
 
     table: (k, 3) of all lines. Raises ValueError for a first line that is neither a size nor an entry.
     """
-    if not re.fullmatch(r"\s*(\d+)\s+\1\s+\d+\s*", line) or len(table) < 2:
+    if not re.fullmatch(r"\s*(\d+)\s+\1\s+\d+(\.0*)?\s*", line) or len(table) < 2:
         return False
     n, _, entries = table[0]
     others = table[1:]
@@ -100,6 +100,11 @@ def _begins_with_size(line: str, table: np.ndarray) -> bool:
         raise ValueError(
             f"its first line reads {line.strip()!r}, which is no size, as {len(others)} entries follow, in rows and "
             f"columns up to {np.max(others[:, :2]):g}, and no entry, as this one follows again"
+        )
+    if is_entry and is_size and "." in line:
+        raise ValueError(
+            f"its first line reads {line.strip()!r}, which may be a size or an entry; write a size in whole numbers, "
+            "or that entry in another line"
         )
     return is_size
 
