@@ -101,6 +101,10 @@ class TestAbaqus:
         with pytest.raises(ValueError, match=r"'3 3 3.0', which may be a size or an entry"):
             read_array("mass", saved("m.mtx", "3 3 3.0\n1 1 2\n2 2 2\n1 3 2\n"))
 
+    def test_exponents_of_fortran_are_read(self, saved):
+        found = read_array("mass", saved("m.mtx", "1 1 2.5D0\n2 2 1.d+01\n3 3 2D-1\n"))
+        assert_array_equal(found.diagonal(), [2.5, 10.0, 0.2])
+
     def test_files_with_and_without_nodes_do_not_mix(self, saved, refused):
         files = saved("j_MASS1.mtx", coordinate(MASS)), saved("j_STIF1.mtx", nodal(STIFFNESS))
         refused(ValueError, "mass: got a file without nodes", read_structure, *files)

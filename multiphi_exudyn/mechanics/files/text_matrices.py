@@ -36,6 +36,7 @@ CARD = 14  # characters of a number in the header
 FORMAT = re.compile(r"\((?:(\d+)P,?)?(\d*)([IEDFG])(\d+)", re.IGNORECASE)
 TYPES = "RI", "SU", "A"  # real or integer; symmetric or unsymmetric; assembled
 SUBSTRUCTURE = re.compile(r"\*MATRIX,TYPE=(\w+)", re.IGNORECASE)
+FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")  # of exponents in double precision
 EMPTY_ROWS = 100  # rows for every entry: with more rows an index is wrong, and the matrix would take much memory
 
 
@@ -68,7 +69,7 @@ def triplets(path: Path) -> Matrix | NodalMatrix:
         raise ValueError(
             f"a line has {columns} columns, and not 3 (row, column, value) or 5 (twice node and component, value)"
         )
-    table = np.loadtxt(lines, ndmin=2, dtype=float)
+    table = np.loadtxt([FORTRAN.sub("e", line) for line in lines], ndmin=2, dtype=float)
     labels = table[:, :-1].astype(np.int64)
     if not np.array_equal(labels, table[:, :-1]):
         raise ValueError("a row or column is no whole number")
