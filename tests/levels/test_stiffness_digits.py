@@ -228,6 +228,14 @@ class TestSoftBesideStiff:
         is_right = abs(found - exact) < 1e-3 * exact
         assert is_right or any(warning.startswith("digits: ") for warning in model.stiffness_warnings())
 
+    @pytest.mark.parametrize("soft", [0.0, 8.1])
+    def test_a_long_sparse_chain_tells_its_soft_spring(self, soft):
+        n, stiff = 700, 1e13
+        diagonal = np.r_[soft + stiff, np.full(n - 2, 2 * stiff), stiff]
+        stiffness = scipy.sparse.diags_array([diagonal, -stiff, -stiff], offsets=[0, 1, -1], shape=(n, n))
+        model = mp.MultiPhiModel(mp.LinearStructure(scipy.sparse.eye_array(n), stiffness), modes=5)
+        assert any("of far stiffer springs" in warning for warning in model.stiffness_warnings()) == (soft > 0)
+
     @pytest.mark.parametrize("kind", [np.asarray, scipy.sparse.csr_array])
     @pytest.mark.parametrize("seed", range(6))
     def test_free_springs_of_many_additions_are_no_cause_of_a_warning(self, seed, kind):

@@ -38,7 +38,7 @@ MOVED = 1e-5  # of the largest displacement of rigid-body modes: smaller ones ar
 DEVIATIONS = 4.0  # sigma: the largest error of omega^2
 UNUSED = 4.0  # units of the last bit of the largest entry
 CERTAIN = 8.0  # units: few matrices of rounded numbers are multiples of them by chance
-NEARLY_FREE = 1e-13  # of a row's diagonal entry: larger row sums are springs to the ground without doubt, or gears
+NEARLY_FREE = 1e-9  # of a row's diagonal entry: larger row sums are springs to the ground without doubt, or gears
 SPLIT = 2.0**27 + 1
 
 
