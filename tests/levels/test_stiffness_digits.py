@@ -61,6 +61,58 @@ class TestFewDigits:
         assert structure.n > 600
         assert np.count_nonzero(model.level(()).frequencies == 0) == 16
 
+    @pytest.mark.parametrize("kind", [np.asarray, scipy.sparse.csr_array])
+    @pytest.mark.parametrize("elements", [16, 20])
+    @pytest.mark.parametrize(
+        ("told", "rounded"),
+        [
+            ("5 decimals", lambda k: np.round(k, 5)),
+            ("3 decimals", lambda k: np.round(k, 3)),
+            ("steps of 1", np.round),
+            ("single precision", lambda k: printed(k, "single")),
+            ("8 digits in some", lambda k: np.where(np.add(*np.indices(k.shape)) < len(k) // 2, k, printed(k, 8))),
+            ("10 digits in some", lambda k: np.where(np.minimum(*np.indices(k.shape)) % 2 == 0, printed(k, 10), k)),
+        ],
+    )
+    def test_a_free_beam_stays_free_however_it_was_rounded(self, told, rounded, elements, kind):
+        exact, whole = mp.MultiPhiModel(free_beam(elements)), free_beam(elements)
+        stiffness = rounded(np.array(whole.stiffness))
+        points = {"tip": np.array(whole.row("tip"))}
+        model = mp.MultiPhiModel(
+            mp.LinearStructure(np.array(whole.mass), kind((stiffness + stiffness.T) / 2), points=points)
+        )
+        assert np.count_nonzero(model.level(()).frequencies == 0) == 2
+        with pytest.warns(mp.MultiPhiWarning, match=f"^digits: the stiffness has {told}"):
+            x = model.static_equilibrium({"tip": 10.0}, inertia_relief=True)
+        relieved = exact.static_equilibrium({"tip": 10.0}, inertia_relief=True)
+        assert_allclose(points["tip"] @ x, exact.structure.row("tip") @ relieved, rtol=5e-3)
+
+    @pytest.mark.parametrize("steps", [1.0, 1e3])
+    @pytest.mark.parametrize("seed", range(3))
+    def test_whole_numbers_of_springs_are_exact(self, seed, steps):
+        rng = np.random.default_rng(seed)
+        springs, n = steps * np.round(10.0 ** rng.uniform(4.5, 9, 12)), 12
+        stiffness = np.diag(springs) + np.diag(np.r_[springs[1:], 0.0])
+        stiffness -= np.diag(springs[1:], 1) + np.diag(springs[1:], -1)
+        stiffness[0, 0] += steps - springs[0]  # a soft spring to the ground
+        model = mp.MultiPhiModel(mp.LinearStructure(np.eye(n), stiffness))
+        assert_allclose(model.level(()).frequencies[0], math.sqrt(steps / n) / 2 / math.pi, rtol=1e-3)
+        assert not model.stiffness_warnings()
+
+    def test_a_refusal_names_the_digits_where_they_may_be_the_cause(self):
+        mass, stiffness = np.array(free_beam().mass), np.array(free_beam().stiffness)
+        row = np.array(free_beam().row("tip"))
+        for kind in (np.asarray, scipy.sparse.csr_array):
+            below = mp.LinearStructure(mass, kind(stiffness - 2e3 * np.outer(row, row)))
+            with pytest.raises(mp.MultiPhiValueError, match="matrix, with all its digits if this one was rounded"):
+                mp.MultiPhiModel(below).level(())
+            below = mp.LinearStructure(mass, kind(np.round(stiffness - 2e4 * np.outer(row, row), 3)))
+            with pytest.raises(mp.MultiPhiValueError, match="matrix with more than the 3 decimals of this one"):
+                mp.MultiPhiModel(below).level(())
+        far = mp.LinearStructure(np.eye(2), [[1.0, 2.0], [2.0, 1.0]])
+        with pytest.raises(mp.MultiPhiValueError, match=r"need a positive semidefinite matrix$"):
+            mp.MultiPhiModel(far).level(())
+
     def test_the_digits_are_told_with_what_they_leave_open(self):
         model = mp.MultiPhiModel(with_digits(free_beam(), 9))
         with pytest.warns(
@@ -164,8 +216,29 @@ class TestSoftBesideStiff:
         run = mp.simulate(mp.MultiPhiModel(structure), 1.0, velocity=np.ones(2))
         assert any(warning.startswith("digits: ") and "of far stiffer springs" in warning for warning in run.warnings)
 
+    @pytest.mark.parametrize("kind", [np.asarray, scipy.sparse.csr_array])
+    @pytest.mark.parametrize("ratio", [1e13, 3e13, 1e14, 5e14, 1e15])
+    @pytest.mark.parametrize("scale", [1.0, 1e-6])
+    @pytest.mark.parametrize("soft", [8.0, 8.1])
+    def test_three_masses_in_a_row_too_dense_and_sparse(self, kind, ratio, scale, soft):
+        k, s = soft * scale, ratio * scale
+        stiffness = np.array([[k + s, -s, 0.0], [-s, 2 * s, -s], [0.0, -s, s]])
+        model = mp.MultiPhiModel(mp.LinearStructure(kind(scale * np.eye(3)), kind(stiffness)))
+        found, exact = model.level(()).frequencies[0], math.sqrt(soft / 3) / 2 / math.pi
+        is_right = abs(found - exact) < 1e-3 * exact
+        assert is_right or any(warning.startswith("digits: ") for warning in model.stiffness_warnings())
+
+    @pytest.mark.parametrize("soft", [0.0, 8.1])
+    def test_a_long_sparse_chain_tells_its_soft_spring(self, soft):
+        n, stiff = 700, 1e13
+        diagonal = np.r_[soft + stiff, np.full(n - 2, 2 * stiff), stiff]
+        stiffness = scipy.sparse.diags_array([diagonal, -stiff, -stiff], offsets=[0, 1, -1], shape=(n, n))
+        model = mp.MultiPhiModel(mp.LinearStructure(scipy.sparse.eye_array(n), stiffness), modes=5)
+        assert any("of far stiffer springs" in warning for warning in model.stiffness_warnings()) == (soft > 0)
+
+    @pytest.mark.parametrize("kind", [np.asarray, scipy.sparse.csr_array])
     @pytest.mark.parametrize("seed", range(6))
-    def test_free_springs_of_many_additions_are_no_cause_of_a_warning(self, seed):
+    def test_free_springs_of_many_additions_are_no_cause_of_a_warning(self, seed, kind):
         """Parallel ones too, of far apart stiffnesses, added in any order or by a product of matrices."""
         rng = np.random.default_rng(seed)
         n = int(rng.integers(2, 7))
@@ -177,6 +250,6 @@ class TestSoftBesideStiff:
         for k, row in zip(stiffnesses, stretches, strict=True):
             added += k * np.outer(row, row)
         for stiffness in (added, stretches.T @ np.diag(stiffnesses) @ stretches):
-            model = mp.MultiPhiModel(mp.LinearStructure(np.eye(n), (stiffness + stiffness.T) / 2))
+            model = mp.MultiPhiModel(mp.LinearStructure(np.eye(n), kind((stiffness + stiffness.T) / 2)))
             assert model.level(()).frequencies[0] == 0
             assert not model.stiffness_warnings()

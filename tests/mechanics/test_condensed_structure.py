@@ -103,10 +103,52 @@ class TestPoints:
         assert_allclose(run.at("mass", t), exact.at("mass", t), atol=1e-3 * np.max(np.abs(exact.at("mass", t))))
 
     def test_nodes_name_condensed_rows(self):
-        dofs = [(1, "ux"), (1, "rz"), (2, "ux")]
-        built = mp.condensed_structure(np.diag([1.0, 0.0, 1.0]), CHAIN, points={"turn": (1, "rz")}, dofs=dofs)
+        dofs = [(1, "ux"), (1, "rz"), (1, "ry"), (2, "ux")]
+        mass, stiffness = np.diag([1.0, 0.0, 0.0, 1.0]), np.insert(np.insert(CHAIN, 2, 0.0, 0), 2, 0.0, 1)
+        stiffness[2, 2] = 1.0
+        built = mp.condensed_structure(mass, stiffness, points={"turn": (1, "rz")}, dofs=dofs)
         assert built.dofs.rows == ((1, "ux"), (2, "ux"), (1, "rz"))
         assert_allclose(built.row("turn"), [0.5, 0.5, 1.0])
+
+    @pytest.mark.parametrize("kind", KINDS)
+    @pytest.mark.parametrize("supports", [[], [0]])
+    @pytest.mark.parametrize("local", [True, False])
+    def test_as_many_coordinates_as_rows_are_these_rows(self, kind, supports, local):
+        """A displacement of all rows is what it says, and one of the masses alone is told by ``condensed``."""
+        rng = np.random.default_rng(5)
+        mass, stiffness = random_problem(rng, 7, 2, local)
+        if supports:
+            mass, stiffness = (scipy.linalg.block_diag([[1.0]], m) for m in (mass, stiffness))
+        n = len(mass)
+        points = {"a": rng.standard_normal(n), "b": n - 1, "c": n - 2}
+        built = mp.condensed_structure(KINDS[kind](mass), KINDS[kind](stiffness), points=points, fixed=supports)
+        kept = np.setdiff1d(np.arange(n), supports)
+        assert_array_equal(built.free, kept)
+        x = rng.standard_normal(len(kept))
+        assert_array_equal(built.full(x)[kept], x)
+        row = np.zeros(n) + np.eye(n)[n - 1]
+        assert_array_equal(built.row("b"), row[kept])
+        frequencies = mp.MultiPhiModel(built, modes="all").level(()).frequencies
+        exact = finite_frequencies(mass[np.ix_(kept, kept)], stiffness[np.ix_(kept, kept)])
+        assert_allclose(frequencies[: len(exact)], exact, rtol=1e-6)
+        assert frequencies[len(exact)] > 100 * exact[-1]
+        y = np.zeros(n)
+        y[kept] = x
+        still = built.condensed(y)
+        motions = built.motions.toarray()[kept]
+        forces = motions.T @ stiffness[np.ix_(kept, kept)] @ still
+        sizes = np.abs(motions).T @ np.abs(stiffness[np.ix_(kept, kept)]) @ np.abs(still)
+        assert np.all(np.abs(forces) < 1e-9 * sizes)
+        assert_allclose(mass[np.ix_(kept, kept)] @ still, mass[np.ix_(kept, kept)] @ x, rtol=1e-7)
+
+    def test_a_run_from_all_rows_begins_there(self):
+        built = mp.condensed_structure(np.diag([1.0, 0.0, 1.0]), CHAIN, points={"middle": 1, "tip": 2})
+        x = np.array([0.01, 0.015, 0.02])
+        run = mp.simulate(mp.MultiPhiModel(built), 0.1, displacement=x)
+        assert_allclose([run.at("middle", 0.0), run.at("tip", 0.0)], x[1:], rtol=1e-9)
+        few = mp.condensed_structure(np.diag([1.0, 0.0, 1.0]), CHAIN, points={"tip": 2})
+        with pytest.raises(mp.MultiPhiValueError, match="displacement"):
+            mp.simulate(mp.MultiPhiModel(few), 0.1, displacement=x)
 
     def test_points_that_depend_on_others_have_no_coordinate_of_their_own(self):
         points = {"a": 1, "twice": np.array([0.0, 2.0, 0.0]), "other": np.array([1.0, 1.0, 0.0])}
@@ -144,6 +186,13 @@ class TestRefusals:
         sparse = mp.LinearStructure(scipy.sparse.csr_array(mass), scipy.sparse.csr_array(np.diag([1e4, 1e2, 1e4])))
         with pytest.raises(mp.MultiPhiValueError, match=r"lower rank, 1 .* row 1, "):
             mp.MultiPhiModel(sparse).level(())
+
+    @pytest.mark.parametrize("diagonal", [[1.0, -1.0, 1.0], [0.0, 0.0, 0.0]])
+    def test_what_cannot_be_condensed_is_not_sent_back(self, diagonal):
+        for build in (mp.condensed_structure, mp.LinearStructure):
+            with pytest.raises(mp.MultiPhiValueError, match="mass") as error:
+                build(np.diag(diagonal), CHAIN)
+            assert "condensed_structure" not in str(error.value)
 
     @pytest.mark.parametrize("kind", KINDS)
     def test_an_indefinite_mass_is_not_condensed(self, kind):

@@ -194,6 +194,33 @@ class TestSeveralArrays:
         scipy.io.savemat(tmp_path / "k.mat", {"title": "a structure", "model": {"name": "boom"}})
         assert "it holds no array of numbers" in refusal(mass, tmp_path / "k.mat")
 
+    @pytest.mark.parametrize("key", ["K", "kaa", "Stiffness", "stiffnessMatrix", "C", "bgg", "damping", "C_red"])
+    def test_the_only_one_is_no_other_quantity_than_its_name_says(self, tmp_path, key):
+        """As where the mass stands beside it as text, in a cell or another object."""
+        file, cell = tmp_path / "model.mat", np.array([MASS.toarray()], dtype=object)
+        for content in ({key: STIFFNESS}, {"model": {key: STIFFNESS.toarray(), "M": cell}}, {key: STIFFNESS, "M": "m"}):
+            scipy.io.savemat(file, content)
+            named = f"model.{key}" if "model" in content else key
+            assert f"its only array of numbers is '{named}', by its name the " in refusal(file, file)
+            assert read_array("mass", (file, named)).shape == (N, N)
+
+    @pytest.mark.parametrize("key", ["A", "matrix", "data", "arr_0", "M", "MAA", "mass_matrix", "results"])
+    def test_the_only_one_of_any_other_name_is_taken(self, tmp_path, mass, key):
+        scipy.io.savemat(tmp_path / "m.mat", {key: MASS})
+        assert_array_equal(read_array("mass", tmp_path / "m.mat").toarray(), MASS.toarray())
+
+    @pytest.mark.parametrize("key", ["M", "maa", "massMatrix", "C", "d1"])
+    def test_the_only_one_is_no_stiffness_by_such_a_name(self, tmp_path, mass, key):
+        scipy.io.savemat(tmp_path / "k.mat", {key: MASS})
+        assert f"by its name the {'damping' if key in ('C', 'd1') else 'mass'}; if" in refusal(mass, tmp_path / "k.mat")
+
+    @pytest.mark.parametrize("name", ["a.mat", "a.npz", "a.npy", "a.mtx", "a.sti"])
+    def test_one_is_not_both_mass_and_stiffness(self, tmp_path, name):
+        file = tmp_path / name
+        scipy.io.savemat(file, {"A": MASS}) if name == "a.mat" else write(file, MASS)
+        assert "stiffness: got the " in (told := refusal(file, file))
+        assert told.endswith("which is the mass, need another one")
+
     @pytest.mark.parametrize(
         ("package", "ending", "told"),
         [("h5py", ".mat", "pip install 'multiphi-exudyn.matlab.'"), ("pyyeti", ".op4", "multiphi-exudyn.nastran.'")],

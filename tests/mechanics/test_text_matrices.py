@@ -89,7 +89,21 @@ class TestAbaqus:
         found = read_structure(*files, points={"follows": (10, "uz")})
         assert_array_equal(found.massless, [5])
         assert found.dofs.rows[5] == (10, "uz")
-        assert_allclose(found.row("follows"), [0, 0, 1 / 3, 0, 1 / 3, 1], rtol=1e-12)  # between ux of nodes 10 and 7
+        assert_array_equal(found.row("follows"), [0, 0, 0, 0, 0, 1])
+        for third in (2, 4):  # between ux of nodes 10 and 7
+            assert_allclose(found.condensed(np.eye(6)[third])[5], 1 / 3, rtol=1e-12)
+        assert_allclose(read_structure(*files).transformation.toarray()[5], [0, 0, 1 / 3, 0, 1 / 3], rtol=1e-12)
+
+    def test_a_size_with_a_point_is_a_size_or_refused(self, saved):
+        entries = "1 1 2\n2 2 2\n3 3 2\n"
+        found = read_array("mass", saved("m.mtx", "3 3 3.0\n" + entries))
+        assert_array_equal(found.toarray(), 2 * np.eye(3))
+        with pytest.raises(ValueError, match=r"'3 3 3.0', which may be a size or an entry"):
+            read_array("mass", saved("m.mtx", "3 3 3.0\n1 1 2\n2 2 2\n1 3 2\n"))
+
+    def test_exponents_of_fortran_are_read(self, saved):
+        found = read_array("mass", saved("m.mtx", "1 1 2.5D0\n2 2 1.d+01\n3 3 2D-1\n"))
+        assert_array_equal(found.diagonal(), [2.5, 10.0, 0.2])
 
     def test_files_with_and_without_nodes_do_not_mix(self, saved, refused):
         files = saved("j_MASS1.mtx", coordinate(MASS)), saved("j_STIF1.mtx", nodal(STIFFNESS))

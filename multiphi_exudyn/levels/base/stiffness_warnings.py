@@ -43,8 +43,7 @@ def stiffness_warnings(stiffness: Any, modes: Modes) -> Iterator[str]:
                 f"{math.sqrt(np.max(squares)) / 2 / math.pi:.2g} Hz{first}; they are taken as free; if a soft "
                 "suspension holds the structure, give the stiffness with all its digits"
             )
-    is_rounded = digits is None and not scipy.sparse.issparse(stiffness) and not is_exact(stiffness)
-    if is_rounded and modes.rigid:
+    if digits is None and modes.rigid and (scipy.sparse.issparse(stiffness) or not is_exact(stiffness)):
         squares = np.einsum("ij,ij->j", rigid, doubled_product(stiffness, rigid))
         least = np.maximum(RESOLVED * energy_noise(stiffness, rigid), SHAPES * round_off_energy(stiffness, rigid))
         if np.any(squares > least) or (np.any(squares > 0) and has_soft_ground(stiffness, rigid)):
@@ -56,7 +55,7 @@ def stiffness_warnings(stiffness: Any, modes: Modes) -> Iterator[str]:
     largest = round_off_energy(stiffness, shapes) / ROUND_OFF
     if digits is None and np.all(largest * np.finfo(float).eps <= UNCERTAIN * omega**2):
         return
-    are_sums = digits is None and not scipy.sparse.issparse(stiffness) and is_exact(stiffness, CERTAIN)
+    are_sums = digits is None and is_exact(stiffness, CERTAIN)
     shares = energy_noise(stiffness, shapes, digits) / omega**2
     worst = int(np.argmax(shares)) if len(shares) else 0
     if len(shares) and shares[worst] > (FEW_UNITS if are_sums else UNCERTAIN):

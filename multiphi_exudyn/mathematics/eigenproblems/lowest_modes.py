@@ -26,13 +26,14 @@ import scipy.linalg
 import scipy.sparse
 import scipy.sparse.linalg
 
-from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
+from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.mathematics.eigenproblems.inner_products import Vectors, orthonormal_complement, ritz
 from multiphi_exudyn.mathematics.eigenproblems.lanczos import check_mass, definite_factor, lanczos, lanczos_iteration
 from multiphi_exudyn.mathematics.eigenproblems.modes import (
     NEAR,
     Modes,
     first_shift,
+    indefinite,
     modes_from_squares,
     rigid_modes,
 )
@@ -157,10 +158,7 @@ class _Lowest:
         self.shift = shift
         self._factor = definite_factor(scipy.sparse.csc_array(self.stiffness + shift * self.mass))
         if self._factor is None:
-            raise MultiPhiValueError(
-                f"stiffness: indefinite, lowest eigenvalue omega^2 below {-shift:g}; need a positive semidefinite "
-                "matrix"
-            )
+            raise indefinite(self.stiffness, f"below {-shift:g}", is_small=True)
 
     def _find(self, count: int) -> None:
         """Find modes up to ``count``; twice as many where a cluster at their end leaves fewer than ``least``."""

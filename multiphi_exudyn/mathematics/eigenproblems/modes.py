@@ -44,6 +44,7 @@ __all__ = [
     "complete_modes",
     "first_shift",
     "has_clusters",
+    "indefinite",
     "modes_from_squares",
     "right_singular_vectors",
     "rigid_modes",
@@ -100,15 +101,20 @@ def complete_modes(mass: np.ndarray, stiffness: np.ndarray) -> Modes:
             break
     if modes is None:
         lowest = scipy.linalg.eigh(stiffness, mass, eigvals_only=True, subset_by_index=[0, 0])[0]
-        raise _indefinite(lowest)
+        raise indefinite(stiffness, f"= {lowest:g}", lowest >= -FEWEST_DIGITS * _largest(mass, stiffness))
     if 0 < modes.rigid < modes.count:
         modes = _shifted_modes(mass, stiffness, modes.omega[modes.rigid] ** 2) or modes
     return _with_exact_soft_modes(mass, stiffness, modes)
 
 
-def _indefinite(lowest: float) -> MultiPhiValueError:
+def indefinite(stiffness: Any, lowest: str, is_small: bool) -> MultiPhiValueError:
+    """Return the error for an indefinite K, with its digits where they may be the cause, as ``lowest`` is small."""
+    digits, rounded = digits_of(stiffness), ""
+    if is_small:
+        rounded = ", with all its digits if this one was rounded"
+        rounded = rounded if digits is None else f" with more than the {digits.name} of this one"
     return MultiPhiValueError(
-        f"stiffness: indefinite, lowest eigenvalue omega^2 = {lowest:g}; need a positive semidefinite matrix"
+        f"stiffness: indefinite, lowest eigenvalue omega^2 {lowest}; need a positive semidefinite matrix{rounded}"
     )
 
 
@@ -117,7 +123,7 @@ def _with_exact_soft_modes(mass: np.ndarray, stiffness: np.ndarray, modes: Modes
 
     The factor of K has lost them to round-off of the stiff springs, which a K of exact numbers does not have.
     """
-    if not is_exact(stiffness):
+    if not is_exact(stiffness) or digits_of(stiffness) is not None:
         return modes
     modes = _with_soft_ones_among_rigid(stiffness, modes)
     squares, energies = modes.omega**2, round_off_energy(stiffness, modes.shapes)
@@ -152,7 +158,7 @@ def _with_soft_ones_among_rigid(stiffness: np.ndarray, modes: Modes) -> Modes:
     highest = float(modes.omega[-1]) ** 2  # of the modes that the round-off of a shape consists of
     none = NO_ENERGY * max(ROUND_OFF * highest, np.max(round_off_energy(stiffness, own), initial=0.0))
     if np.any(squares < -none):
-        raise _indefinite(float(squares[0]))
+        raise indefinite(stiffness, f"= {squares[0]:g}", is_small=False)
     soft = squares > none
     omega, shapes = modes.omega.copy(), modes.shapes.copy()
     omega[: modes.rigid], shapes[:, : modes.rigid] = np.sqrt(np.where(soft, squares, 0.0)), own @ rotation
@@ -348,5 +354,9 @@ def round_off_energy(stiffness: Any, shapes: np.ndarray) -> np.ndarray:
 
 def first_shift(mass: Any, stiffness: Any) -> float:
     """Return the shift s with which K + s M is definite where K is, but for rigid-body modes."""
-    largest = float(np.max(stiffness.diagonal() / mass.diagonal())) or 1.0  # any shift is good for zero stiffness
-    return largest * (FIRST_SHIFT if digits_of(stiffness) is None else FEW_DIGITS_SHIFT)
+    return _largest(mass, stiffness) * (FIRST_SHIFT if digits_of(stiffness) is None else FEW_DIGITS_SHIFT)
+
+
+def _largest(mass: Any, stiffness: Any) -> float:
+    """Return the largest K_ii / M_ii, 1 for zero stiffness, for which any shift is good."""
+    return float(np.max(stiffness.diagonal() / mass.diagonal())) or 1.0

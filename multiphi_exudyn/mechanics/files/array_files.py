@@ -5,12 +5,13 @@
 .op4    Nastran OUTPUT4, text or binary, dense or sparse, by pyYeti: the extra ``nastran``
 
 A field of a MATLAB struct has the name "model.M". The array is selected by (file, name). Without a name it is the only
-array, or among the largest square ones the only one with a usual initial, variables before fields: M for mass; K for
-stiffness; C, D or B for damping.
+array, if not by its name another quantity, or among the largest square ones the only one with a usual initial,
+variables before fields: M for mass; K for stiffness; C, D or B for damping.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -21,9 +22,15 @@ import scipy.sparse
 
 from multiphi_exudyn.mechanics.structures.arguments import Matrix, one_of
 
-__all__ = ["ARRAY_READERS", "npz_arrays", "select_array"]
+__all__ = ["ARRAY_READERS", "npz_arrays", "selected_name"]
 
 INITIALS = {"mass": ("m",), "stiffness": ("k", "stif"), "damping": ("c", "d", "b")}
+SUFFIX = r"([a-z]{2})?(\d.*|_.*|red.*)?"  # after an initial: Maa, K1, C_red
+OWN_NAMES = {  # of one quantity alone, by which it is no other
+    "mass": re.compile(rf"mass.*|m(?!at){SUFFIX}"),
+    "stiffness": re.compile(r"k.*|stif.*"),
+    "damping": re.compile(rf"damp.*|[cdb](?!at){SUFFIX}"),
+}
 FEM_INTERFACE = {"massMatrix", "stiffnessMatrix", "nodes"}  # arrays of a file that Exudyn's FEMinterface has saved
 NUMBERS = "biufc"  # numpy's codes of numbers
 HDF5 = b"\x89HDF"
@@ -111,19 +118,26 @@ def op4_arrays(path: Path) -> dict[str, Matrix]:
     return arrays
 
 
-def select_array(name: str, arrays: Mapping[str, Matrix], array_name: str | None) -> Matrix:
-    """The array ``array_name``, or for None the only candidate for ``name`` ("mass", "stiffness" or "damping")."""
+def selected_name(name: str, arrays: Mapping[str, Matrix], array_name: str | None) -> str:
+    """Name of the array: ``array_name``, or for None the only candidate for ``name`` ("mass", "stiffness", ...)."""
     if array_name is not None:
         if array_name not in arrays:
             raise ValueError(f"it has no array {array_name!r}, need {one_of(array_name, arrays)}")
-        return arrays[array_name]
+        return array_name
     if len(arrays) == 1:
-        return next(iter(arrays.values()))
+        only = next(iter(arrays))
+        others = [other for other, names in OWN_NAMES.items() if names.fullmatch(_last_part(only))]
+        if name in OWN_NAMES and others and name not in others:
+            raise ValueError(
+                f"its only array of numbers is {only!r}, by its name the {others[0]}; if it is the {name}, say so, "
+                f"(file, {only!r})"
+            )
+        return only
     square = {key: array.shape[0] for key, array in arrays.items() if array.ndim == 2 and len({*array.shape}) == 1}
     candidates = [
         key
         for key, n in square.items()
-        if n == max(square.values()) and key.lower().rpartition(".")[2].startswith(INITIALS.get(name, ()))
+        if n == max(square.values()) and _last_part(key).startswith(INITIALS.get(name, ()))
     ]
     candidates = [key for key in candidates if "." not in key] or candidates  # variables before fields
     if len(candidates) != 1:
@@ -132,7 +146,12 @@ def select_array(name: str, arrays: Mapping[str, Matrix], array_name: str | None
             if arrays
             else "it holds no array of numbers, by its own name or in a struct; need M and K as variables, or fields"
         )
-    return arrays[candidates[0]]
+    return candidates[0]
+
+
+def _last_part(key: str) -> str:
+    """The name of a variable, or of a field in its struct, in lower case."""
+    return key.lower().rpartition(".")[2]
 
 
 def _matrices(arrays: Mapping[str, Any]) -> dict[str, Matrix]:

@@ -27,7 +27,7 @@ import scipy.io
 import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.mechanics.files.array_files import ARRAY_READERS, npz_arrays, select_array
+from multiphi_exudyn.mechanics.files.array_files import ARRAY_READERS, npz_arrays, selected_name
 from multiphi_exudyn.mechanics.files.text_matrices import (
     NodalMatrix,
     complete,
@@ -156,7 +156,12 @@ def read_structure(
     files = {"mass": mass, "stiffness": stiffness}
     if isinstance(damping, (str, os.PathLike, tuple)):
         files["damping"] = damping
-    matrices, table = _in_same_rows({name: _matrix(name, file) for name, file in files.items()})
+    found = {name: _matrix(name, file) for name, file in files.items()}
+    if found["mass"][1:] == found["stiffness"][1:] and not (isinstance(mass, tuple) or isinstance(stiffness, tuple)):
+        array_name = found["mass"][2]
+        shown = f"the array {array_name!r}" if array_name else "the matrix"
+        raise MultiPhiValueError(f"stiffness: got {shown} of {found['mass'][1]!r}, which is the mass, need another one")
+    matrices, table = _in_same_rows({name: matrix for name, (matrix, *_) in found.items()})
     if table is not None and dofs is not None:
         raise MultiPhiValueError("dofs: got a table beside files that name their nodes, need none")
     if isinstance(dofs, (str, os.PathLike)):
@@ -173,7 +178,7 @@ def read_structure(
 
 def read_array(name: str, file: MatrixFile) -> Matrix:
     """One array in a file, sparse or dense, of any shape; name: of the argument, for errors."""
-    matrix = _matrix(name, file)
+    matrix, *_ = _matrix(name, file)
     return matrix.matrix if isinstance(matrix, NodalMatrix) else matrix
 
 
@@ -182,7 +187,8 @@ def read_arrays(name: str, path: Path) -> dict[str, np.ndarray]:
     return _read(name, path, "an .npz file of arrays", npz_arrays)
 
 
-def _matrix(name: str, given: Any) -> Matrix | NodalMatrix:
+def _matrix(name: str, given: Any) -> tuple[Matrix | NodalMatrix, str, str]:
+    """The matrix of an argument, with the file and the name of the array, "" in a file of one matrix."""
     array_name: str | None = None
     if isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], str):
         given, array_name = given
@@ -191,7 +197,9 @@ def _matrix(name: str, given: Any) -> Matrix | NodalMatrix:
     path = Path(given)
     several = ARRAY_READERS.get(path.suffix.lower(), substructure_matrices if _is_substructure(path) else None)
     if several is not None:
-        return _read(name, path, "a readable matrix", lambda p: select_array(name, several(p), array_name))
+        arrays = _read(name, path, "a readable matrix", several)
+        chosen = _read(name, path, "a readable matrix", lambda _: selected_name(name, arrays, array_name))
+        return arrays[chosen], os.path.realpath(path), chosen
     reader = next((read for ending, read in READERS.items() if path.name.lower().endswith(ending)), None)
     if reader is None:
         instead = OTHER_FILES.get(path.suffix.lower())
@@ -199,7 +207,7 @@ def _matrix(name: str, given: Any) -> Matrix | NodalMatrix:
         raise MultiPhiValueError(f"{name}: got {str(path)!r}{beside}, need a file that ends in {', '.join(ENDINGS)}")
     if array_name is not None:
         raise MultiPhiValueError(f"{name}: got an array {array_name!r} of {str(path)!r}, need a file of several arrays")
-    return _read(name, path, "a readable matrix", reader)
+    return _read(name, path, "a readable matrix", reader), os.path.realpath(path), ""
 
 
 def _in_same_rows(matrices: Mapping[str, Matrix | NodalMatrix]) -> tuple[dict[str, Matrix], DofTable | None]:

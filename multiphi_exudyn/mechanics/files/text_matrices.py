@@ -36,6 +36,7 @@ CARD = 14  # characters of a number in the header
 FORMAT = re.compile(r"\((?:(\d+)P,?)?(\d*)([IEDFG])(\d+)", re.IGNORECASE)
 TYPES = "RI", "SU", "A"  # real or integer; symmetric or unsymmetric; assembled
 SUBSTRUCTURE = re.compile(r"\*MATRIX,TYPE=(\w+)", re.IGNORECASE)
+FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")  # of exponents in double precision
 EMPTY_ROWS = 100  # rows for every entry: with more rows an index is wrong, and the matrix would take much memory
 
 
@@ -68,7 +69,7 @@ def triplets(path: Path) -> Matrix | NodalMatrix:
         raise ValueError(
             f"a line has {columns} columns, and not 3 (row, column, value) or 5 (twice node and component, value)"
         )
-    table = np.loadtxt(lines, ndmin=2, dtype=float)
+    table = np.loadtxt([FORTRAN.sub("e", line) for line in lines], ndmin=2, dtype=float)
     labels = table[:, :-1].astype(np.int64)
     if not np.array_equal(labels, table[:, :-1]):
         raise ValueError("a row or column is no whole number")
@@ -90,7 +91,7 @@ def _begins_with_size(line: str, table: np.ndarray) -> bool:
 
     table: (k, 3) of all lines. Raises ValueError for a first line that is neither a size nor an entry.
     """
-    if not re.fullmatch(r"\s*(\d+)\s+\1\s+\d+\s*", line) or len(table) < 2:
+    if not re.fullmatch(r"\s*(\d+)\s+\1\s+\d+(\.0*)?\s*", line) or len(table) < 2:
         return False
     n, _, entries = table[0]
     others = table[1:]
@@ -100,6 +101,11 @@ def _begins_with_size(line: str, table: np.ndarray) -> bool:
         raise ValueError(
             f"its first line reads {line.strip()!r}, which is no size, as {len(others)} entries follow, in rows and "
             f"columns up to {np.max(others[:, :2]):g}, and no entry, as this one follows again"
+        )
+    if is_entry and is_size and "." in line:
+        raise ValueError(
+            f"its first line reads {line.strip()!r}, which may be a size or an entry; write a size in whole numbers, "
+            "or that entry in another line"
         )
     return is_size
 

@@ -13,6 +13,11 @@ modal_structure.py this is a coordinate w of its own, with a frequency omega_a f
 
     R = Z (Z^T K Z)^-1 Z^T p / rho,   K_w = R^T K R,   M_w = K_w / omega_a^2
 
+Where points keep as many w as there are motions without mass, (u, w) are as many coordinates as x, and the same motion
+is written in x itself: no vector can be meant in the one and taken in the other.
+
+    x = T u + Z a,   a = (Z^T K Z)^-1 Z^T K x,   M_x = M + K Z (Z^T K Z)^-1 Z^T K / omega_a^2,   K_x = K
+
 Source: R. J. Guyan, Reduction of stiffness and mass matrices, AIAA J. 3 (1965) 380, which is exact here.
 """
 
@@ -46,7 +51,8 @@ class CondensedStructure(LinearStructure):
         x = T u + R w,   M Z = 0
 
     It is a LinearStructure in (u, w): u are the displacements of the rows that are kept, without the part that motions
-    without mass have in them, w the direct displacements of points without mass by forces at these points.
+    without mass have in them, w the direct displacements of points without mass by forces at these points. Where these
+    would be as many as the rows that were given, it is a LinearStructure in these rows, x.
 
     Attributes
     ----------
@@ -62,6 +68,8 @@ class CondensedStructure(LinearStructure):
         Their indices among the N rows that were given.
     transformation : sparse array (N, n)
         (T, R), with rows of zeros where supports hold.
+    condensation : sparse array (n, N)
+        Coordinates of the motion T u of all rows, by their displacements.
     motions : sparse array (N, z)
         Z.
     massless : array (z,)
@@ -72,15 +80,16 @@ class CondensedStructure(LinearStructure):
     >>> import numpy as np
     >>> import multiphi_exudyn as mp
     >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-    >>> chain = mp.condensed_structure(np.diag([1.0, 0.0, 1.0]), K, points={"middle": 1, "tip": 2})
-    >>> chain.massless.tolist(), chain.n  # the middle keeps a coordinate, as it is a point
-    ([1], 3)
-    >>> x = mp.MultiPhiModel(chain).static_equilibrium({"middle": 100.0})
+    >>> chain = mp.condensed_structure(np.diag([1.0, 0.0, 1.0]), K, points={"tip": 2})
+    >>> chain.massless.tolist(), chain.n
+    ([1], 2)
+    >>> x = mp.MultiPhiModel(chain).static_equilibrium({"tip": 100.0})
     >>> print(1e3 * chain.full(x).round(6))  # mm
-    [2.5 5.  5. ]
+    [2.5 5.  7.5]
     """
 
     transformation: Matrix
+    condensation: Matrix
     motions: Matrix
     massless: np.ndarray
 
@@ -93,10 +102,9 @@ class CondensedStructure(LinearStructure):
 
     def condensed(self, displacement: np.ndarray) -> np.ndarray:
         """Displacements (or velocities) of the masses, (n,), from those of all rows that were given, (N,)."""
-        values = checked_vector("displacement", displacement, self.transformation.shape[0])
-        moved = values - self.motions @ values[self.massless]
-        moved[self.massless] = 0.0
-        return np.asarray(moved[self.free])
+        return np.asarray(
+            self.condensation @ checked_vector("displacement", displacement, self.transformation.shape[0])
+        )
 
 
 def condensed_structure(
@@ -186,14 +194,28 @@ def condensed_structure(
     direct, at = _direct(motions, inverse, point_matrix, rows)
     if "damping" in matrices:
         _check_damping(motions, matrices["damping"], follow, moving[rows], table)
-    shapes = scipy.sparse.csr_array(scipy.sparse.hstack([follow, direct]))
-    united = {name: _symmetric_product(shapes, matrix) for name, matrix in matrices.items()}
     masses = scipy.sparse.csr_array(given_mass)[kept][:, kept]
-    square = ABOVE * float(np.max(united["stiffness"].diagonal()[: len(kept)] / masses.diagonal())) or 1.0
-    united["mass"] = scipy.sparse.block_diag([masses, united["stiffness"][len(kept) :, len(kept) :] / square], "csr")
+    stiffnesses = _symmetric_product(follow, matrices["stiffness"]).diagonal()
+    square = ABOVE * float(np.max(stiffnesses / masses.diagonal())) or 1.0
+    identity = scipy.sparse.eye_array(len(moving), format="csr")
+    condensation = identity[kept] - scipy.sparse.csr_array(motions)[kept] @ identity[rows]  # u = x_k - Y x_d
+    if len(at) == len(rows):
+        shapes, places = identity, moving
+        pulled = scipy.sparse.csr_array(motions.T @ scipy.sparse.csr_array(matrices["stiffness"]))
+        united = {name: scipy.sparse.csr_array(matrix) for name, matrix in matrices.items()}
+        united["mass"] = scipy.sparse.csr_array(given_mass) + _symmetric_product(pulled, inverse / square)
+        condensation = follow @ condensation
+    else:
+        shapes, places = (
+            scipy.sparse.csr_array(scipy.sparse.hstack([follow, direct])),
+            moving[np.concatenate([kept, at])],
+        )
+        united = {name: _symmetric_product(shapes, matrix) for name, matrix in matrices.items()}
+        own = united["stiffness"][len(kept) :, len(kept) :]
+        united["mass"] = scipy.sparse.block_diag([masses, own / square], "csr")
+        condensation = scipy.sparse.vstack([condensation, scipy.sparse.csr_array((len(at), len(moving)))])
     if not scipy.sparse.issparse(whole_mass):
         united = {name: matrix.toarray() for name, matrix in united.items()}
-    places = moving[np.concatenate([kept, at])]
     among_all = scipy.sparse.csr_array((np.ones(len(moving)), (moving, np.arange(len(moving)))), (total, len(moving)))
     return CondensedStructure(
         united["mass"],
@@ -203,6 +225,7 @@ def condensed_structure(
         None if table is None else table.restricted_to(places),
         free=places,
         transformation=scipy.sparse.csr_array(among_all @ shapes),
+        condensation=scipy.sparse.csr_array(condensation @ among_all.T),
         motions=scipy.sparse.csr_array(among_all @ motions),
         massless=moving[rows],
     )

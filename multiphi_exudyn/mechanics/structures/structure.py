@@ -224,11 +224,13 @@ def _semidefinite_diagonal(name: str, given: Matrix, supported: np.ndarray, movi
 def _check_positive_definite(mass: Matrix, moving: np.ndarray, dofs: DofTable | None) -> Matrix:
     massless = np.flatnonzero(mass.diagonal() <= 0)
     if len(massless):
+        has_lower_rank = np.all(mass.diagonal() >= 0) and np.any(mass.diagonal() > 0)
+        follow = ", or let them follow statically: condensed_structure(mass, stiffness, ...)" if has_lower_rank else ""
         also = f" and {len(massless) - 1} more are 0 or less" if len(massless) > 1 else ""
         raise MultiPhiValueError(
             f"mass: diagonal entry {named_row(moving[massless[0]], dofs)} is {mass.diagonal()[massless[0]]:g}{also}"
-            f"{_first(moving[massless[1:]], dofs)}, need values > 0: hold these (fixed=), give them a small mass, or "
-            "let them follow statically: condensed_structure(mass, stiffness, ...)"
+            f"{_first(moving[massless[1:]], dofs)}, need values > 0: hold these (fixed=), or give them "
+            f"a small mass{follow}"
         )
     if scipy.sparse.issparse(mass):
         return mass  # a factorisation is as expensive as the modes, whose computation checks the mass as well
