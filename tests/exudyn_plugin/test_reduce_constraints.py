@@ -336,6 +336,22 @@ def test_a_prescribed_motion_whose_speed_jumps_moves_as_in_exudyn_with_a_stop_to
     assert off(system, reduction, trajectory) < 2e-4
 
 
+@pytest.mark.parametrize("drive", [{"offsetUserFunction": lambda mbs, t, i, offset: sine(t)[0]}, {}])
+def test_a_run_goes_on_from_another_one(drive):
+    reduction = reduce(driven(stop=True, **drive).mbs)
+    whole, half = run(reduction), run(reduction, END / 2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rest = mp.simulate(reduction.model, END, start=half, loads=reduction.loads)
+    times = np.linspace(END / 2, END, 20)
+    there = reduction.displacement(whole, times)
+    assert reduction.displacement(rest, times) == pytest.approx(there, abs=1e-9 * np.max(np.abs(there)))
+    check = reduction.check(rest)
+    assert check.holds
+    assert END / 2 < check.times[0]
+    assert check.times[-1] == END
+
+
 def test_a_prescribed_motion_begins_at_the_current_time_and_state():
     system = driven(start=SIZE * RATE, offsetUserFunction=lambda mbs, t, i, offset: sine(t)[0])
     _, own = system.own(1.0)
