@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mathematics.functions.interpolation import FEW_SAMPLES, MANY_SAMPLES, Samples
 from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
 from multiphi_exudyn.mechanics.loads.samples import Accelerogram, Sampled
@@ -148,6 +148,8 @@ class Smooth:
         """The value at one time [s]."""
         try:
             value = self.function(time)
+        except MultiPhiError:
+            raise
         except Exception as error:
             cause = " ".join(f"{type(error).__name__} {error}".split())
             raise MultiPhiValueError(f"function: got {cause} at t = {time:g} s, need a number") from error
