@@ -274,11 +274,11 @@ def _check_tolerance(value: float) -> None:
         raise MultiPhiValueError(f"course tolerance: got {value!r}, need {TIGHTEST:g} <= tolerance < 1")
 
 
-def check_time_function(what: str, course: Any) -> None:
+def check_time_function(what: str, course: Any, twice: bool = False) -> None:
+    """Refuse what is no function of time; twice: whether it has to be twice differentiable, as Sampled is not."""
     if not isinstance(course, (Accelerogram, Harmonic, Sampled, Smooth, Sweep)):
-        raise MultiPhiTypeError(
-            f"{what} course: got {type(course).__name__}, need Harmonic, Sampled, Smooth, Sweep or Accelerogram"
-        )
+        kinds = "Harmonic, Smooth, Sweep" if twice else "Harmonic, Sampled, Smooth, Sweep"
+        raise MultiPhiTypeError(f"{what} course: got {type(course).__name__}, need {kinds} or Accelerogram")
 
 
 def _breaks(given: Any) -> tuple[float, ...]:
