@@ -393,10 +393,10 @@ def test_displacements_of_an_accelerogram_at_what_is_no_time_are_refused(times):
 
 @pytest.mark.parametrize(("largest", "factor"), [(1e308, 9.81), (1e300, 10**300), (-1e300, -1e300)])
 def test_accelerations_that_overflow_are_refused_with_the_factor(largest, factor):
-    with pytest.raises(mp.MultiPhiValueError, match="accelerogram factor: got .* need finite accelerations"):
+    with pytest.raises(mp.MultiPhiValueError, match=r"accelerogram factor: got .* need finite accelerations"):
         mp.Accelerogram([0.0, 1.0], [largest, -largest], factor=factor)
 
 
 def test_a_base_motion_names_the_courses_that_it_takes():
-    with pytest.raises(mp.MultiPhiTypeError, match="got NoneType, need Harmonic, Smooth, Sweep or Accelerogram$"):
+    with pytest.raises(mp.MultiPhiTypeError, match=r"got NoneType, need Harmonic, Smooth, Sweep or Accelerogram$"):
         mp.BaseMotion([1.0], None)

@@ -16,7 +16,7 @@ Exudyn's contact dampers pull at separation; those of the model do not (contact.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 

@@ -217,9 +217,7 @@ def _constant(value: Any) -> Callable[..., Any]:
     return lambda *_: value
 
 
-def _motion(
-    item: str, rows: np.ndarray, offset: Callable[[float], np.ndarray], of_velocity: bool
-) -> PrescribedMotion:
+def _motion(item: str, rows: np.ndarray, offset: Callable[[float], np.ndarray], of_velocity: bool) -> PrescribedMotion:
     """Motion by the components of an offset that move anything."""
     moving = np.flatnonzero(np.any(rows, axis=1))
     first = offset(0.0)[moving]
