@@ -387,7 +387,7 @@ def test_displacements_of_an_accelerogram_are_those_of_their_times():
 
 @pytest.mark.parametrize("times", ["x", None, 1j, [np.nan], [[0.1]], ["a"]])
 def test_displacements_of_an_accelerogram_at_what_is_no_time_are_refused(times):
-    with pytest.raises(mp.MultiPhiError, match="^t: got "):
+    with pytest.raises(mp.MultiPhiError, match=r"^t: got "):
         mp.Accelerogram([0.0, 1.0], [0.0, 1.0]).displacement(times)
 
 

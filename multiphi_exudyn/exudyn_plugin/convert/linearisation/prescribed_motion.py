@@ -117,7 +117,7 @@ class _Rate:
             first = int(np.argmax(jumps))
             raise MultiPhiValueError(
                 f"{self.function.item}: got a motion that jumps by {abs(motion.jumps[first]):.3g} m or rad at t = "
-                f"{motion.breaks[first]:.6g} s, to which its dampers answer with an impulse; need a rise that takes time"
+                f"{motion.breaks[first]:.6g} s, to which its dampers answer with an impulse; need a gradual rise"
             )
         return motion.derivative
 
