@@ -69,7 +69,8 @@ def _print_summary(comparison: Comparison, folder: Path) -> None:
             error += f", from stiff stops {percent(comparison.stiff_error(run, until))}"
         line = f"{seconds(run.online_s):>9}  {times(comparison.speedup(run)):>10}  {error if run.ok else run.message}"
         print(f"{name:{width}}  {run.status:6}  {line}")
-    print("", *findings(comparison)["outcome"], sep="\n")
+    found = findings(comparison)
+    print("", *found["outcome"], found["distrust"][-1], sep="\n")  # the last one is of the run times
     for sentence in comparison_warnings(comparison):
         print(f"warning: {sentence}")
     print(folder / "report.html")

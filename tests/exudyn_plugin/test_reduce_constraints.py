@@ -1,7 +1,9 @@
 """Starts that violate constraints, motions that constraints prescribe, and constraints that no linear structure has."""
 
+import copy
 import inspect
 import pickle
+import re
 import warnings
 
 import exudyn as exu
@@ -334,6 +336,99 @@ def test_a_prescribed_motion_whose_speed_jumps_moves_as_in_exudyn_with_a_stop_to
     assert trajectory.warnings == ()
     assert bool(len(trajectory.events)) == stop
     assert off(system, reduction, trajectory) < 2e-4
+
+
+@pytest.mark.parametrize(("size", "time"), [(0.01, 0.5), (-2e-4, 1.37)])
+def test_a_prescribed_motion_that_jumps_is_refused_where_dampers_answer_with_an_impulse(size, time):
+    def step(mbs, t, index, offset):
+        return size * (t > time)
+
+    reduction = reduce(driven(offsetUserFunction=step).mbs)
+    told = f"'drive': got a motion that jumps by {abs(size):g} m or rad at t = {time:g} s, to which its dampers"
+    with pytest.raises(mp.MultiPhiValueError, match=re.escape(told)):
+        run(reduction)
+    assert run(reduction, 0.9 * time).status == "ok"
+    undamped = reduce(driven(dampers=(0.0, 0.0, 0.0), offsetUserFunction=step).mbs)
+    assert run(undamped).warnings == ()
+
+
+@pytest.mark.parametrize("of_velocity", [False, True])
+def test_pulses_of_the_speed_are_as_accurate_as_they_are_said_to_be(of_velocity):
+    def pulse(t):
+        return SIZE * (int(t / 0.2) % 2)
+
+    def steps(t):
+        n = int(t / 0.2)
+        return SIZE * (0.2 * (n // 2) + (t - 0.2 * n if n % 2 else 0.0))
+
+    drive = (
+        {"velocityLevel": True, "offsetUserFunction_t": lambda mbs, t, i, offset: pulse(t)}
+        if of_velocity
+        else {"offsetUserFunction": lambda mbs, t, i, offset: steps(t)}
+    )
+    system = driven(coupling=0.3, **drive)
+    reduction = reduce(system.mbs)
+    trajectory = run(reduction)
+    assert (trajectory.status, trajectory.message, trajectory.warnings) == ("ok", "", ())
+    assert off(system, reduction, trajectory) < 1e-3
+
+
+@pytest.mark.parametrize("given", [np.inf, "1 mm", [0.001], 1j, None])
+def test_an_offset_that_is_no_number_is_refused_by_its_item(given):
+    needed = re.escape(f"'drive' offset: got {given!r} at t = 0 s, need a finite number")
+    with pytest.raises(mp.MultiPhiValueError, match=needed):
+        reduce(driven(offsetUserFunction=lambda mbs, t, i, offset: given).mbs)
+
+
+@pytest.mark.parametrize("first", [0.0, 0.7])
+def test_an_offset_that_fails_is_refused_by_its_item_when_it_is_needed(first):
+    def drive(mbs, t, index, offset):
+        return 1 / 0 if t >= first else 0.0
+
+    with pytest.raises(mp.MultiPhiValueError, match=r"'drive' offset: got ZeroDivisionError .* at t = .* s, need"):
+        run(reduce(driven(offsetUserFunction=drive).mbs))
+
+
+def test_a_run_with_a_prescribed_motion_says_that_it_cannot_be_pickled(tmp_path):
+    reduction = reduce(driven(offsetUserFunction=lambda mbs, t, i, offset: sine(t)[0]).mbs)
+    trajectory = run(reduction)
+    for whole in (trajectory, reduction):
+        with pytest.raises(mp.MultiPhiTypeError, match=r"'drive' prescribes, .* keep a run with Trajectory\.save"):
+            pickle.dumps(whole)
+    trajectory.save(tmp_path / "run")
+    assert copy.deepcopy(reduction.loads[-1]).function(0.1) == reduction.loads[-1].function(0.1)
+
+
+@pytest.mark.parametrize(
+    ("times", "told"),
+    [("a", "t: got str"), ([[0.1, 0.2]], r"t: got shape \(1, 2\)"), (None, "t: got nan"), (np.nan, "t: got nan")],
+)
+def test_displacements_at_what_is_no_time_are_refused(times, told):
+    reduction = reduce(driven(offsetUserFunction=lambda mbs, t, i, offset: sine(t)[0]).mbs)
+    with pytest.raises(mp.MultiPhiError, match=told):
+        reduction.displacement(run(reduction), times)
+
+
+def test_displacements_of_what_is_no_run_are_refused():
+    reduction = reduce(driven().mbs)
+    with pytest.raises(mp.MultiPhiTypeError, match="trajectory: got None, need a Trajectory of this model"):
+        reduction.displacement(None, 0.1)
+
+
+@pytest.mark.parametrize("drive", [{"offsetUserFunction": lambda mbs, t, i, offset: sine(t)[0]}, {}])
+def test_a_run_goes_on_from_another_one(drive):
+    reduction = reduce(driven(stop=True, **drive).mbs)
+    whole, half = run(reduction), run(reduction, END / 2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rest = mp.simulate(reduction.model, END, start=half, loads=reduction.loads)
+    times = np.linspace(END / 2, END, 20)
+    there = reduction.displacement(whole, times)
+    assert reduction.displacement(rest, times) == pytest.approx(there, abs=1e-9 * np.max(np.abs(there)))
+    check = reduction.check(rest)
+    assert check.holds
+    assert check.times[0] > END / 2
+    assert check.times[-1] == END
 
 
 def test_a_prescribed_motion_begins_at_the_current_time_and_state():

@@ -6,12 +6,14 @@ import json
 import re
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from small_scene import BEAM, changed, write
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.cli import compare_command
 from multiphi_exudyn.study.comparison import figure_style, plots
 from multiphi_exudyn.study.comparison.compare import Comparison, compare, histories, summary
 from multiphi_exudyn.study.comparison.findings import findings
@@ -240,10 +242,12 @@ def test_without_a_coarser_copy_the_uncertainty_is_called_unknown(comparison, pi
         assert figure_style.png(plots.error_time_figure(spoiled)).startswith(b"\x89PNG")
 
 
-def test_a_busy_machine_is_told_with_its_load(comparison):
+def test_a_busy_machine_is_told_with_its_load(comparison, capsys):
     alone, busy = (replace(comparison, environment={"cores": 4, "load_average": load}) for load in (3.9, 11.25))
     assert "Compare ratios" in findings(alone)["distrust"][-1]
     assert "the load average rose to 11 on 4 cores" in findings(busy)["distrust"][-1]
+    compare_command._print_summary(busy, Path())
+    assert "the load average rose to 11 on 4 cores" in capsys.readouterr().out
 
 
 def test_a_page_says_where_its_points_are(comparison, setup):

@@ -376,3 +376,27 @@ def test_a_sweep_of_thousands_of_cycles_is_no_failure_though_its_phase_is_known_
     assert run.status == "ok"
     assert "smooth loads: the response is accurate to" in run.message
     assert len(run.segments) < 2000
+
+
+def test_displacements_of_an_accelerogram_are_those_of_their_times():
+    record = mp.Accelerogram([0.0, 0.1, 0.2, 0.3], [0.0, 0.8, -0.8, 0.0], factor=9.81)
+    assert float(record.displacement(0.1)) == pytest.approx(9.81 * 0.8 * 0.1**2 / 6)
+    assert np.shape(record.displacement(0.1)) == ()
+    assert record.displacement([0.2, 0.1]) == pytest.approx([float(record.displacement(t)) for t in (0.2, 0.1)])
+
+
+@pytest.mark.parametrize("times", ["x", None, 1j, [np.nan], [[0.1]], ["a"]])
+def test_displacements_of_an_accelerogram_at_what_is_no_time_are_refused(times):
+    with pytest.raises(mp.MultiPhiError, match=r"^t: got "):
+        mp.Accelerogram([0.0, 1.0], [0.0, 1.0]).displacement(times)
+
+
+@pytest.mark.parametrize(("largest", "factor"), [(1e308, 9.81), (1e300, 10**300), (-1e300, -1e300)])
+def test_accelerations_that_overflow_are_refused_with_the_factor(largest, factor):
+    with pytest.raises(mp.MultiPhiValueError, match=r"accelerogram factor: got .* need finite accelerations"):
+        mp.Accelerogram([0.0, 1.0], [largest, -largest], factor=factor)
+
+
+def test_a_base_motion_names_the_courses_that_it_takes():
+    with pytest.raises(mp.MultiPhiTypeError, match=r"got NoneType, need Harmonic, Smooth, Sweep or Accelerogram$"):
+        mp.BaseMotion([1.0], None)

@@ -72,6 +72,26 @@ class TestLeaving:
         assert told(outside)[3] == 0.0
         assert "starts outside its span" in " ".join(outside.warnings)
 
+    @pytest.mark.parametrize("side", [1.0, -1.0])
+    def test_is_not_told_of_a_law_that_is_no_force_there(self, side):
+        """A ball that flies free of a Hertzian contact, and is thrown beyond the other end."""
+        structure = mp.LinearStructure([[1.0]], [[0.0]], points={"x": 0})
+        places = (-0.2, 0.1) if side > 0 else (-0.1, 0.2)
+        law = mp.ForceLaw("x", lambda q: side * 1e3 * np.maximum(side * q, 0.0) ** 1.5, span=places, tolerance=1e-3)
+        model = mp.MultiPhiModel(structure, [law])
+        flown = mp.simulate(model, 5.0, displacement=[-0.1 * side], velocity=[0.5 * side])
+        assert -side * flown.at("x", 5.0) > 1.0
+        assert flown.status == "ok"
+        assert told(flown) is None
+        thrown = mp.simulate(model, 5.0, displacement=[-0.1 * side], velocity=[5.0 * side])
+        assert abs(told(thrown)[4]) > 0.1
+
+    @pytest.mark.parametrize("shift", [0.0, 1e-8, -1e-8])
+    def test_is_not_told_of_a_start_at_the_end(self, shift):
+        structure = mp.LinearStructure([[1.0]], [[0.0]], points={"x": 0})
+        law = mp.ForceLaw("x", lambda q: 4 * q + q**3, span=(-0.2, 0.1), tolerance=1e-4)
+        assert told(mp.simulate(mp.MultiPhiModel(structure, [law]), 5.0, displacement=[0.1 + shift])) is None
+
     def test_is_told_of_each_of_many_runs_as_of_it_alone(self):
         model = electrode(0.4)
         speeds = np.array([[0.0], [0.5], [-0.1], [0.3]])

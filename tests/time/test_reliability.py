@@ -20,6 +20,7 @@ from multiphi_exudyn.levels.level import level
 from multiphi_exudyn.mathematics.response.coupled_response import modal_response
 from multiphi_exudyn.time.loop import chatter
 from multiphi_exudyn.time.loop.verdict import is_balanced
+from multiphi_exudyn.time.record import recorded_segments
 from multiphi_exudyn.time.reliability.defects import defects
 from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
 from multiphi_exudyn.time.reliability.run_warnings import warnings_of
@@ -644,6 +645,14 @@ class TestMeshImpacts:
         (told,) = (sentence for sentence in run.warnings if sentence.startswith("mesh impacts: "))
         assert f"{100 * run.ledger.impact / run.ledger.initial:.2g} % of the largest energy" in told
         assert error > 0.05
+
+    def test_are_told_without_an_object_of_any_event(self, monkeypatch):
+        """Objects of all events would take longer than the run."""
+        monkeypatch.setattr(recorded_segments, "Event", None)
+        run, _ = self.run(self.bar(20), 3)
+        assert "mesh impacts" in kinds(run)
+        with pytest.raises(TypeError):
+            run.events[0]
 
     @pytest.mark.parametrize(("elements", "periods"), [(60, 1), (120, 1)])
     def test_of_a_fine_mesh_are_not(self, elements, periods):

@@ -16,7 +16,7 @@ Exudyn's contact dampers pull at separation; those of the model do not (contact.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -44,7 +44,11 @@ from multiphi_exudyn.exudyn_plugin.convert.linearisation.full_system import (
     without_contacts,
 )
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.linearisation import MovedBy
-from multiphi_exudyn.exudyn_plugin.convert.linearisation.prescribed_motion import PrescribedMotion, RateLoad
+from multiphi_exudyn.exudyn_plugin.convert.linearisation.prescribed_motion import (
+    Component,
+    PrescribedMotion,
+    RateLoad,
+)
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.start_state import moved_onto_constraints
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.timed_loads import (
     TimedLoad,
@@ -233,10 +237,12 @@ def _fixed(friction: Friction | str, prescribed: np.ndarray) -> Friction | str:
 
 def _motion_loads(moved: MovedBy) -> Iterator[VaryingLoad]:
     """Loads -S^T K e^T u and -S^T C e^T u' of a prescribed motion."""
-    for kind, matrix in ((FunctionLoad, moved.stiffness), (RateLoad, moved.damping)):
+    motion = moved.motion
+    rates, speed = (RateLoad, motion.value) if motion.speed is None else (FunctionLoad, motion.speed)
+    for kind, matrix, values in ((FunctionLoad, moved.stiffness, motion.value), (rates, moved.damping, speed)):
         for column, unit in zip(matrix.T, np.eye(matrix.shape[1]), strict=True):
             if np.any(column):
-                yield kind(-column, _combined(moved.motion, unit))
+                yield kind(-column, Component(motion.item, values, unit))
 
 
 def _stop_motions(
@@ -245,11 +251,7 @@ def _stop_motions(
     """The motion of a contact's stop by each prescribed motion: that of its gap, but opposite."""
     for motion in motions.values():
         if moved_by(row, motion.directions):
-            yield StopMotion(contact.name, Smooth(_combined(motion, -motion.directions @ row)))
-
-
-def _combined(motion: PrescribedMotion, weights: np.ndarray) -> Callable[[Any], float]:
-    return lambda t: float(weights @ motion.value(t))
+            yield StopMotion(contact.name, Smooth(Component(motion.item, motion.value, -motion.directions @ row)))
 
 
 def _with_time_change(

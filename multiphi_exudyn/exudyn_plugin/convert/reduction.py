@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.display import Shown, names, per_cent
+from multiphi_exudyn.errors import MultiPhiTypeError
 from multiphi_exudyn.exudyn_plugin.convert.items.item_fates import grouped
 from multiphi_exudyn.exudyn_plugin.convert.items.items import Item
 from multiphi_exudyn.exudyn_plugin.convert.linear_range.linear_range import LinearLimits, LinearRange
@@ -118,10 +119,20 @@ class Reduction(Shown):
         -------
         array (n_full,) or (n_full, k)
             [m, rad], in the order of ``mbs.systemData.GetODE2Coordinates()``.
+
+        Raises
+        ------
+        MultiPhiTypeError
+            For something else than a trajectory, and times that are not numbers.
+        MultiPhiValueError
+            For times outside the trajectory.
         """
+        if not isinstance(trajectory, Trajectory):
+            raise MultiPhiTypeError(f"trajectory: got {trajectory!r}, need a Trajectory of this model")
+        z = trajectory.displacement(times)
         moved = np.transpose([self.prescribed(t) for t in np.atleast_1d(times)]) + self.shift[:, None]
         moved = moved if np.ndim(times) else moved[:, 0]
-        return np.asarray(self.structure.coordinates @ trajectory.displacement(times) + moved)
+        return np.asarray(self.structure.coordinates @ z + moved)
 
     @property
     def report(self) -> str:

@@ -110,7 +110,7 @@ class BaseMotion:
     fixed_stops: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        check_time_function("base motion", self.course)
+        check_time_function("base motion", self.course, twice=True)
         if isinstance(self.course, Sampled):
             raise MultiPhiTypeError(
                 "base motion course: got Sampled, a displacement whose acceleration is infinite at its samples, need "

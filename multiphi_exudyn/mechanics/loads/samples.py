@@ -150,8 +150,15 @@ class Accelerogram:
         samples = Sampled(self.time, self.values)
         if not is_real(self.factor):
             raise MultiPhiTypeError(f"accelerogram factor: got {self.factor!r}, need a number [m/s2]")
-        if not np.isfinite(self.factor):
+        factor = float(self.factor)
+        if not np.isfinite(factor):
             raise MultiPhiValueError(f"accelerogram factor: got {self.factor!r}, need a finite number [m/s2]")
+        largest = float(np.max(np.abs(samples.values)))
+        if not np.isfinite(2 * largest * factor):
+            raise MultiPhiValueError(
+                f"accelerogram factor: got {self.factor!r} times values up to {largest:g}, need finite accelerations"
+            )
+        object.__setattr__(self, "factor", factor)
         object.__setattr__(self, "time", samples.time)
         object.__setattr__(self, "values", samples.values)
 
@@ -161,10 +168,23 @@ class Accelerogram:
         samples = Sampled.from_csv(path, column)
         return cls(samples.time, samples.values, factor)
 
-    def displacement(self, t: np.ndarray) -> np.ndarray:
-        """Displacement z (k,) [m] at times (k,) [s]."""
-        times = np.asarray(t, float)
-        return self.history(2 * float(np.max(times, initial=0.0))).at(times)
+    def displacement(self, t: float | np.ndarray) -> np.ndarray:
+        """Displacement z [m] at times [s]: () for a scalar t, (k,) for (k,) times.
+
+        Raises
+        ------
+        MultiPhiTypeError
+            For times that are not real numbers.
+        MultiPhiValueError
+            For times that are not finite, or not a scalar or (k,).
+        """
+        times = np.asarray(real_array("t", t, "a time or (k,) times in s"))
+        if times.ndim > 1:
+            raise MultiPhiValueError(f"t: got shape {times.shape}, need a scalar or (k,)")
+        if not np.all(np.isfinite(times)):
+            raise MultiPhiValueError("t: got a value that is NaN or infinite, need times in s")
+        each = np.atleast_1d(times)
+        return self.history(2 * float(np.max(each, initial=0.0))).at(each).reshape(times.shape)
 
     def acceleration(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
         """z'' up to ``end`` [s]."""

@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.mathematics.functions.interpolation import FEW_SAMPLES, MANY_SAMPLES, Samples
 from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
 from multiphi_exudyn.mechanics.loads.samples import Accelerogram, Sampled
@@ -148,6 +148,8 @@ class Smooth:
         """The value at one time [s]."""
         try:
             value = self.function(time)
+        except MultiPhiError:
+            raise
         except Exception as error:
             cause = " ".join(f"{type(error).__name__} {error}".split())
             raise MultiPhiValueError(f"function: got {cause} at t = {time:g} s, need a number") from error
@@ -272,11 +274,11 @@ def _check_tolerance(value: float) -> None:
         raise MultiPhiValueError(f"course tolerance: got {value!r}, need {TIGHTEST:g} <= tolerance < 1")
 
 
-def check_time_function(what: str, course: Any) -> None:
+def check_time_function(what: str, course: Any, twice: bool = False) -> None:
+    """Refuse what is no function of time; twice: whether it has to be twice differentiable, as Sampled is not."""
     if not isinstance(course, (Accelerogram, Harmonic, Sampled, Smooth, Sweep)):
-        raise MultiPhiTypeError(
-            f"{what} course: got {type(course).__name__}, need Harmonic, Sampled, Smooth, Sweep or Accelerogram"
-        )
+        kinds = "Harmonic, Smooth, Sweep" if twice else "Harmonic, Sampled, Smooth, Sweep"
+        raise MultiPhiTypeError(f"{what} course: got {type(course).__name__}, need {kinds} or Accelerogram")
 
 
 def _breaks(given: Any) -> tuple[float, ...]:

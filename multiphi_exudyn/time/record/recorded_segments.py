@@ -65,6 +65,7 @@ class Recorded(LazySequence[Segment], Segments):
         self._make, self._count, self._made = record.segment, record.count, {}
         self._record, self.arrays = record, record.arrays
         self._sums, self._left_out = sums, record.left_out_count
+        self._sizes: dict[float, tuple[float, float]] = {}  # by the end of the time
 
     @property
     def defects(self) -> float:
@@ -122,7 +123,9 @@ class Recorded(LazySequence[Segment], Segments):
 
     def sizes(self, end: float) -> tuple[float, float]:
         """See ``Segments``."""
-        return self._record.sizes(end)
+        if end not in self._sizes:
+            self._sizes[end] = self._record.sizes(end)
+        return self._sizes[end]
 
     def _integral(
         self, level: LoadedLevel, row: np.ndarray, places: np.ndarray, starts: np.ndarray, ends: np.ndarray

@@ -58,11 +58,15 @@ def is_taking(numbers: np.ndarray) -> bool:
 
 def mesh_warnings(trajectory: Trajectory, spread: Sequence[str]) -> Iterator[str]:
     """At most one sentence on a run whose impacts took energy; spread: see ``spread_contacts``."""
-    struck = {event.contact for event in trajectory.events if event.impulse > 0}
-    names = [name for name in spread if name in struck]
-    taken = trajectory.start_loss.impact + sum(e.loss.impact for e in trajectory.events if e.contact in names)
+    record, index = trajectory.ending.record, trajectory.model.index
+    contacts, impulses, lost = record.kinds[record.struck, 0], record.impacts[:, 0], record.impacts[:, 1]
+    struck, losses = (np.bincount(contacts, amounts, len(trajectory.model.contacts)) for amounts in (impulses, lost))
+    names = [name for name in spread if struck[index(name)] > 0]
+    if not names:
+        return
+    taken = trajectory.start_loss.impact + float(sum(losses[index(name)] for name in names))
     largest = max(trajectory.segments.sizes(trajectory.t_end)[1], abs(trajectory.initial_energy))
-    if names and taken > TAKEN * largest:
+    if taken > TAKEN * largest:
         yield (
             f"mesh impacts: impacts on {', '.join(map(repr, names))} took {per_cent(taken / largest)} of the largest "
             "energy of the run, and stop a mass that falls with every mode and element, so the loss is that of the "

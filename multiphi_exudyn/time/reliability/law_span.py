@@ -1,7 +1,7 @@
 """Law span: force laws that a motion drives out of the span on which they are given.
 
-Beyond its span the last segment of a law is continued. That is an extrapolation, and where the segment is falling the
-motion may grow without limit.
+Beyond its span the last segment of a law is continued. That is an extrapolation unless it is no force at all, and where
+the segment is falling the motion may grow without limit.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["LawPlaces", "law_times", "laws_at_an_end", "span_warnings"]
 
-BEYOND = 1e-9  # of the span's width: a law is not left by less
+BEYOND = 1e-6  # of the span's width: a law is not left by less, as by a start at its end
 FEWEST, PER_PERIOD = 9, 8  # samples of a segment of the motion, and of a period of its level's highest frequency
 MOST = 20_000  # samples of a run
 
@@ -56,9 +56,16 @@ def _left_span(trajectory: Trajectory, law: ForceLaw) -> Iterator[str]:
 
 
 def _beyond(law: ForceLaw, places: np.ndarray) -> np.ndarray:
-    """Return how far places (k,) are beyond a law's span, in widths of it; negative inside."""
+    """Return how far places (k,) are beyond a law's span, in widths of it; negative inside, and 0 where it is free.
+
+    A law whose last segment is no force goes on as it is, so beyond that end nothing is extrapolated.
+    """
     low, high = float(law.knots[0]), float(law.knots[-1])
-    return np.asarray(np.maximum(places - high, low - places) / (high - low))
+    sides = [
+        np.minimum(side, 0.0) if not np.any(law.forces[ends]) else side
+        for side, ends in ((places - high, slice(-2, None)), (low - places, slice(2)))
+    ]
+    return np.asarray(np.maximum(*sides) / (high - low))
 
 
 def _sentence(law: ForceLaw, how: str, time: float, farthest: float, when: float) -> str:

@@ -46,7 +46,6 @@ from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.events.arrays import BALANCED
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.state import event_table
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.model.mode_choice import Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
@@ -224,7 +223,7 @@ def _slow(trajectory: Trajectory, fastest: float) -> Iterator[str]:
 
 def _struck(trajectory: Trajectory) -> bool:
     """Whether a rigid contact was struck."""
-    return bool(np.any(event_table(trajectory.events, trajectory.model.index)[:, 2] > 0))
+    return bool(np.any(trajectory.ending.record.impacts[:, 0] > 0))
 
 
 def _slow_mode(trajectory: Trajectory) -> Iterator[str]:

@@ -133,7 +133,7 @@ class LinearRange:
         linear = self._linear
         sizes = np.hypot(linear.size(z), [linear.prescribed_size(t) for t in samples])
         speeds = np.hypot(linear.size(z_t), [linear.prescribed_size(t, 1) for t in samples])
-        spread = np.linspace(0.0, trajectory.t_end, (DENSE if self._evaluated else SPREAD) + 1)[1:]
+        spread = np.linspace(trajectory.t_start, trajectory.t_end, (DENSE if self._evaluated else SPREAD) + 1)[1:]
         extremes = samples[np.argmax(sizes)], samples[np.argmax(speeds)]
         times = np.unique([*spread, *extremes, *_closings(trajectory, linear.spheres)])
         largest = self._largest(trajectory)
@@ -141,7 +141,8 @@ class LinearRange:
             return RangeCheck(times, np.zeros(len(times)))
         if reason := self._changed():
             return RangeCheck(times, np.zeros(len(times)), reason)
-        rate = max(float(np.max(speeds) / np.max(sizes)), 1.0 / trajectory.t_end)  # at least 1 rad in the run
+        duration = trajectory.t_end - trajectory.t_start
+        rate = max(float(np.max(speeds) / np.max(sizes)), 1.0 / duration)  # at least 1 rad in the run
         scales = MotionScales(largest, float(np.max(sizes)), rate)
         elements = [contact for contact in trajectory.model.contacts if contact.name in linear.contacts]
         with linear.compared_with(self._mbs) as compared:
@@ -164,7 +165,7 @@ class LinearRange:
         errors = np.maximum(errors, impact_errors)
         amplitudes = (linear.modes[1].T @ (linear.mass @ trajectory.displacement(times))).T
         return RangeCheck(
-            times, errors, "", _lag(deviations, amplitudes, rate * trajectory.t_end), _lowest_eigenvalue(stiffness)
+            times, errors, "", _lag(deviations, amplitudes, rate * duration), _lowest_eigenvalue(stiffness)
         )
 
     def _changed(self) -> str:
@@ -246,5 +247,5 @@ def _closings(trajectory: Trajectory, names: Collection[str]) -> np.ndarray:
 
 def _sampled(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times (SAMPLES,) over the run, displacements and velocities (n, SAMPLES)."""
-    samples = np.linspace(0.0, trajectory.t_end, SAMPLES)
+    samples = np.linspace(trajectory.t_start, trajectory.t_end, SAMPLES)
     return samples, trajectory.displacement(samples), trajectory.velocity(samples)

@@ -19,15 +19,21 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.convert.items.directions import Directions
 from multiphi_exudyn.exudyn_plugin.convert.items.items import is_active
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.constraints import residuals
-from multiphi_exudyn.exudyn_plugin.convert.linearisation.timed_loads import SAMPLE_TIMES, SystemPlaceholder
+from multiphi_exudyn.exudyn_plugin.convert.linearisation.timed_loads import (
+    SAMPLE_TIMES,
+    ReadsSystem,
+    SystemPlaceholder,
+    checked,
+)
 from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
 from multiphi_exudyn.mechanics.loads.loads import VaryingLoad
 from multiphi_exudyn.mechanics.loads.time_functions import Smooth
 
-__all__ = ["PrescribedMotion", "RateLoad", "prescribed_motions"]
+__all__ = ["Component", "PrescribedMotion", "RateLoad", "check_offsets", "prescribed_motions"]
 
 UNIT = 1e-6  # m, rad: change of an offset, by whose effect its direction is determined
 FINE, COARSE = 1e-3, 1e-2  # of the time scale: steps of the first and of the second derivative
@@ -44,9 +50,10 @@ INTEGRATED = 1e-12  # of an integral of the absolute values: error of one interv
 class PrescribedMotion:
     """q = q_0 + S z + directions^T value(t): directions (k, n_full), value: u (k,) of the time t [s], zero at t = 0.
 
-    scale: of the time [s] in which u changes. speed: u' (k,), if it is given.
+    item: type and name of the constraint. scale: of the time [s] in which u changes. speed: u' (k,), if it is given.
     """
 
+    item: str
     directions: np.ndarray
     value: Callable[[float], np.ndarray]
     scale: float
@@ -61,27 +68,66 @@ class PrescribedMotion:
         return _difference(self.value, t, (FINE if order == 1 else COARSE) * self.scale, order)
 
 
+class Component:
+    """A sum of the components of a prescribed motion, or of its speed, as a function of time [s]: weights.values(t)."""
+
+    def __init__(self, item: str, values: Callable[[float], np.ndarray], weights: np.ndarray) -> None:
+        self.item, self._values, self._weights = item, values, weights
+
+    def __call__(self, t: Any) -> float:
+        """The sum at one time [s]."""
+        return float(self._weights @ self._values(t))
+
+    def __deepcopy__(self, memo: Any) -> Component:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        raise MultiPhiTypeError(
+            f"pickle: got the motion that {self.item} prescribes, a Python function, which cannot be pickled; keep a "
+            "run with Trajectory.save, or pickle its displacements; the model alone can be pickled"
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class RateLoad(VaryingLoad):
-    """A load by the rate of a function of time, f(t) = p u'(t), of the polynomials that approximate u."""
+    """A load by the rate of a function of time, f(t) = p u'(t), of the polynomials that approximate u.
 
-    function: Callable[[Any], float]
+    The impulse of a jump of u has no part in them: a jump is refused.
+    """
+
+    function: Component
 
     @property
     def course(self) -> Any:
         """u'(t)."""
-        return _Rate(Smooth(self.function))
+        return _Rate(self.function)
 
 
 @dataclass(frozen=True)
 class _Rate:
     """u', as a function of time of a load."""
 
-    function: Smooth
+    function: Component
 
     def history(self, end: float, finer: float = 1.0) -> PiecewiseExponential:
         """u' up to ``end`` [s]."""
-        return self.function.history(end, finer).derivative
+        motion = Smooth(self.function).history(end, finer)
+        jumps = np.isin(motion.breaks, motion.jump_times()) & (motion.breaks > 0) & (motion.breaks < end)
+        if np.any(jumps):
+            first = int(np.argmax(jumps))
+            raise MultiPhiValueError(
+                f"{self.function.item}: got a motion that jumps by {abs(motion.jumps[first]):.3g} m or rad at t = "
+                f"{motion.breaks[first]:.6g} s, to which its dampers answer with an impulse; need a gradual rise"
+            )
+        return motion.derivative
+
+
+def check_offsets(mbs: Any, objects: Sequence[Mapping[str, Any]], start: float) -> None:
+    """Refuse user functions of offsets that give no finite numbers at the time ``start`` [s], by their items."""
+    placeholder = SystemPlaceholder(dict(mbs.variables))
+    for i, item in enumerate(objects):
+        if _offset_function(item) and is_active(item):
+            _value(item, i, start, placeholder)
 
 
 def prescribed_motions(
@@ -102,7 +148,7 @@ def prescribed_motions(
             continue
         slopes = _slopes(mbs, solver, i, item, present if _is_of_velocity(item) else value(0.0))
         rows = np.array([directions.solve(np.zeros(len(directions.mass)), -slope) for slope in slopes])
-        found[i] = _motion(rows, value, _is_of_velocity(item))
+        found[i] = _motion(_named(item), rows, value, _is_of_velocity(item))
     return found
 
 
@@ -137,14 +183,16 @@ def _value(
         return f"its user function is of type {user['type']}, need Python"
     function = user["function"]
 
-    def value(t: float) -> np.ndarray:
-        return np.array(function(placeholder, start + float(t), index, parameter), dtype=float).reshape(size)
-
+    value = checked(f"{_named(item)} offset", lambda t: function(placeholder, start + t, index, parameter), size)
     try:
         value(0.0)
-    except Exception as error:  # any error of the user's function
-        return f"its user function depends on more than time ({' '.join(str(error).split())})"
+    except ReadsSystem as error:
+        return f"its user function depends on more than time ({error})"
     return value
+
+
+def _named(item: Mapping[str, Any]) -> str:
+    return f"Object{item['objectType']} {item['name']!r}"
 
 
 def _slopes(mbs: Any, solver: Any, index: int, item: Mapping[str, Any], offset: np.ndarray) -> np.ndarray:
@@ -169,19 +217,24 @@ def _constant(value: Any) -> Callable[..., Any]:
     return lambda *_: value
 
 
-def _motion(rows: np.ndarray, offset: Callable[[float], np.ndarray], of_velocity: bool) -> PrescribedMotion:
+def _motion(item: str, rows: np.ndarray, offset: Callable[[float], np.ndarray], of_velocity: bool) -> PrescribedMotion:
     """Motion by the components of an offset that move anything."""
     moving = np.flatnonzero(np.any(rows, axis=1))
     first = offset(0.0)[moving]
     speed = functools.lru_cache(KEPT)(lambda t: offset(t)[moving]) if of_velocity else None
     value = functools.lru_cache(KEPT)(_Integral(speed) if speed else lambda t: offset(t)[moving] - first)
-    return PrescribedMotion(rows[moving], value, _time_scale(speed or value), speed)
+    return PrescribedMotion(item, rows[moving], value, _time_scale(speed or value), speed)
 
 
 def _time_scale(function: Callable[[float], np.ndarray]) -> float:
-    """Largest change of a function over its fastest rate [s], among the sampled times."""
-    values = np.array([function(t) for t in SAMPLE_TIMES])
-    rates = np.abs(np.diff(values, axis=0)) / np.diff(SAMPLE_TIMES)[:, None]
+    """Largest change of a function over its fastest rate [s], among the sampled times up to which it is defined."""
+    values = list[np.ndarray]()
+    try:
+        for t in SAMPLE_TIMES:
+            values.append(function(t))
+    except MultiPhiValueError:  # a run that goes as far says so
+        pass
+    rates = np.abs(np.diff(values, axis=0)) / np.diff(SAMPLE_TIMES[: len(values)])[:, None]
     fastest, change = np.max(rates, initial=0.0), np.max(np.ptp(values, axis=0), initial=0.0)
     return float(change / fastest) if fastest > 0 else 1.0
 

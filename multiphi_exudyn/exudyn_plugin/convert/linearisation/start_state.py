@@ -24,7 +24,11 @@ from multiphi_exudyn.exudyn_plugin.convert.linearisation.geometric_stiffness imp
     static_solver,
 )
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.matrix_checks import check_finite, check_mass
-from multiphi_exudyn.exudyn_plugin.convert.linearisation.prescribed_motion import PrescribedMotion, prescribed_motions
+from multiphi_exudyn.exudyn_plugin.convert.linearisation.prescribed_motion import (
+    PrescribedMotion,
+    check_offsets,
+    prescribed_motions,
+)
 
 __all__ = ["StartState", "moved_onto_constraints", "violated_constraints"]
 
@@ -49,6 +53,7 @@ class StartState:
 def moved_onto_constraints(mbs: Any, objects: Sequence[Mapping[str, Any]], time: float) -> StartState:
     """Move the initial and the current state to where the constraints of a time [s] are met."""
     data, kinds = mbs.systemData, exu.ConfigurationType
+    check_offsets(mbs, objects, time)
     with static_solver(mbs) as solver:
         data.SetTime(time)
         start, jacobian = data.GetODE2Coordinates(), constraint_jacobian(mbs, solver)

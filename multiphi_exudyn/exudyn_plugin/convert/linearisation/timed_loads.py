@@ -18,8 +18,18 @@ from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.convert.items.items import user_function, value_key
 from multiphi_exudyn.exudyn_plugin.convert.linearisation.geometric_stiffness import generalised_forces, static_solver
 from multiphi_exudyn.mechanics.loads.loads import FunctionLoad
+from multiphi_exudyn.mechanics.structures.arguments import is_real
 
-__all__ = ["SAMPLE_TIMES", "SystemPlaceholder", "TimedLoad", "function_loads", "timed_forces", "timed_loads"]
+__all__ = [
+    "SAMPLE_TIMES",
+    "ReadsSystem",
+    "SystemPlaceholder",
+    "TimedLoad",
+    "checked",
+    "function_loads",
+    "timed_forces",
+    "timed_loads",
+]
 
 SAMPLE_TIMES = np.concatenate(
     [[0.0], np.geomspace(1e-6, 1e3, 64)]
@@ -108,6 +118,31 @@ def _value(
     return value
 
 
+class ReadsSystem(MultiPhiValueError):
+    """A user function that reads the system."""
+
+
+def checked(what: str, evaluate: Callable[[float], Any], size: int) -> Callable[[float], np.ndarray]:
+    """A user function of time with its values (size,) checked; what: the item and its function, for the errors."""
+    needed = "a finite number" if size == 1 else f"{size} finite numbers"
+
+    def value(t: float) -> np.ndarray:
+        time = float(t)
+        try:
+            given = evaluate(time)
+        except ReadsSystem:
+            raise
+        except Exception as error:  # any error of the user's function
+            cause = " ".join(f"{type(error).__name__} {error}".split())
+            raise MultiPhiValueError(f"{what}: got {cause} at t = {time:g} s, need {needed}") from error
+        values = np.array(given) if is_real(given) or (size > 1 and np.shape(given) == (size,)) else np.array("")
+        if values.dtype.kind not in "biuf" or not np.all(np.isfinite(values)):
+            raise MultiPhiValueError(f"{what}: got {given!r} at t = {time:g} s, need {needed}")
+        return values.astype(float).reshape(size)
+
+    return value
+
+
 class SystemPlaceholder:
     """Argument of a user function in place of the system, which does not exist in the model's run.
 
@@ -118,7 +153,7 @@ class SystemPlaceholder:
         self.variables = variables
 
     def __getattr__(self, name: str) -> Any:
-        raise MultiPhiValueError(f"it reads mbs.{name}")
+        raise ReadsSystem(f"it reads mbs.{name}")
 
 
 def _rows(mbs: Any, index: int) -> np.ndarray:
