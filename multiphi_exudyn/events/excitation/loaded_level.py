@@ -20,6 +20,7 @@ from multiphi_exudyn.events.excitation.channels import Channels
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.level.level import Asymptotic, Level
+from multiphi_exudyn.levels.level.sliding import SlidingLevel
 from multiphi_exudyn.mathematics.response.free_response import ModalResponse
 
 __all__ = ["LoadedLevel", "PotentialForm", "StrainForm"]
@@ -124,7 +125,7 @@ class LoadedLevel(Shown):
 
     def _under(self, excitation: Excitation) -> LoadedLevel:
         equilibrium, gaps, acting = self.asymptotic, self.gap_constants, excitation
-        if excitation.steady >= 0 and np.any(self.pushes):
+        if excitation.steady >= 0 and np.any(self._push):
             equilibrium = self.level.asymptotic(excitation.static)
             gaps = equilibrium.gaps
             patterns = excitation.patterns.copy()
@@ -184,7 +185,12 @@ class LoadedLevel(Shown):
 
     @property
     def _push(self) -> np.ndarray:
-        """Load (m,) of the constant forces of its elements."""
+        """Load (m,) of the constant forces of its elements that act on a steady channel.
+
+        None where contacts slide, whose friction follows them, nor beside rigid-body modes, which have no equilibrium.
+        """
+        if isinstance(self.level, SlidingLevel) or self.level.base.modes.rigid:
+            return np.zeros(len(self.level.base.directions))
         return np.asarray(self.level.base.directions @ self.pushes)
 
     @functools.cached_property
