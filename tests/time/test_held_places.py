@@ -172,3 +172,20 @@ def test_many_runs_and_continued_ones_are_the_same_motion():
     first = mp.simulate(model, 0.15, displacement=x[0], velocity=v[0], loads=loads)
     rest = mp.simulate(model, 1.0, start=first, loads=loads)
     assert_allclose(rest.at("x", 1.0), whole.at("x", 1.0), rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("with_law", [False, True])
+def test_constant_forces_beside_damped_free_motions_close_the_ledger(with_law):
+    """Friction at its limit, and a force law, act on blocks that slide freely and are damped."""
+    guided = {"y": 1.0, "x": 0.5} if with_law else "y"
+    parts = [
+        mp.UnilateralContact("floor", "y", 0.0, 1e4, friction=0.3, tangential="x"),
+        mp.Friction("guide", guided, 2.0, stiffness=1e3, velocity=0.3 * with_law),
+    ]
+    parts += [mp.ForceLaw("y", LAW, name="law")] if with_law else []
+    structure = mp.LinearStructure(np.eye(2), np.zeros((2, 2)), 0.3 * np.eye(2), {"x": 0, "y": 1})
+    loads = [mp.ConstantLoad("y", -WEIGHT), mp.ConstantLoad("x", -3.0)]
+    start = np.array([0.0, 0.05]), np.array([2.0, 0.0])
+    run = mp.simulate(mp.MultiPhiModel(structure, parts), 1.0, *start, loads=loads)
+    assert {event.contact for event in run.events} >= {"floor", "guide"}
+    assert_lawful(run, loads)
