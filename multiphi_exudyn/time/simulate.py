@@ -187,9 +187,8 @@ class SharedResources(Protocol):
 class Run:
     """Arguments of ``simulate``, which documents them; t_end [s].
 
-    rewound: whether time begins anew at the end of ``start``, for periodic loads over whole periods. provisional:
-    whether another solver goes on, for longer than t_end. shared: levels and arrays that it shares with other runs,
-    None where it is alone. ahead: its motion, where it is already at the end.
+    rewound: whether time begins anew at the end of ``start``, for periodic loads over whole periods. shared: levels and
+    arrays that it shares with other runs, None where it is alone. ahead: its motion, where it is already at the end.
     """
 
     model: MultiPhiModel
@@ -200,7 +199,6 @@ class Run:
     compiled: bool | None = None
     start: Trajectory | Equilibrium | None = None
     rewound: bool = False
-    provisional: bool = False
     shared: SharedResources | None = None
     ahead: Motion | None = None
 
@@ -253,17 +251,12 @@ class Run:
         time = 0.0 if before is None or self.rewound else before.t_end
 
         def build() -> LoadedLevels:
-            lasting = math.inf if self.provisional else self.t_end
-            excitation = Excitation.of(model, self.loads, self.t_end, finer, lasting)
+            excitation = Excitation.of(model, self.loads, self.t_end, finer)
             return LoadedLevels.under(model, excitation, time, self.t_end, lasting=self.t_end)
 
         if self.shared is not None:
             return self.shared.levels((id(model), finer), build)
-        return (
-            build()
-            if loads is None
-            else model.loaded.get_or_build((loads, time, self.t_end, finer, self.provisional), build)
-        )
+        return build() if loads is None else model.loaded.get_or_build((loads, time, self.t_end, finer), build)
 
     def _with_decided_modes(self) -> Trajectory:
         """Trajectory of a model whose number of modes the first run decides."""

@@ -525,6 +525,22 @@ class TestFriction:
         assert all("'c' moves against its slip for 26 %" in text for text in run.warnings if "backward" in text)
 
 
+@pytest.mark.parametrize(("stiffness", "told"), [(0.0, ""), (1e-32, " 100 % of"), (1e-14, " 1 % of"), (1e-2, "")])
+def test_a_mode_too_slow_for_a_run_is_told_with_what_is_lost(stiffness, told):
+    """m x'' + k x = p from rest: as good as p t^2 / 2 m, unless round-off takes it."""
+    structure = mp.LinearStructure([[1.0]], [[stiffness]], points={"m": 0})
+    model = mp.MultiPhiModel(structure, [stop("m", 1e3, 1e3)], modes="all")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", mp.MultiPhiWarning)
+        run = mp.simulate(model, 2.0, loads=[mp.ConstantLoad("m", 3.0)])
+    assert kinds(run) == (["slow model", "slow mode"] if told else [])  # the only mode that there is
+    assert told in "".join(run.warnings)
+    if not told:
+        omega = math.sqrt(stiffness)
+        expected = 6.0 if omega == 0 else 3.0 * (1 - math.cos(2 * omega)) / stiffness
+        assert run.at("m", 2.0) == pytest.approx(expected, rel=1e-9)
+
+
 class TestOpenLedger:
     """A level whose modes do not move as its own equation says: nothing else in a run would tell."""
 

@@ -95,16 +95,11 @@ class Excitation:
     steady: int = -1
 
     @classmethod
-    def of(
-        cls, model: MultiPhiModel, loads: Sequence[Load], end: float, finer: float = 1.0, lasting: float = math.inf
-    ) -> Excitation:
-        """Return the loads of a run of ``model`` until ``end`` [s]; functions are fitted to their tolerance / finer.
-
-        lasting: duration [s] in which slow modes hardly move; infinite if the run may last longer than ``end``.
-        """
+    def of(cls, model: MultiPhiModel, loads: Sequence[Load], end: float, finer: float = 1.0) -> Excitation:
+        """Return the loads of a run of ``model`` until ``end`` [s]; functions are fitted to their tolerance / finer."""
         if isinstance(loads, (str, Mapping)) or not isinstance(loads, Iterable):
             raise MultiPhiTypeError(f"loads: got {type(loads).__name__}, need a sequence of loads")
-        base, channels = model.base, LoadChannels(model, end, finer, lasting)
+        base, channels = model.base, LoadChannels(model, end, finer)
         for number, load in enumerate(loads):
             channels.label = load_label(number, load)
             channels.add(load)

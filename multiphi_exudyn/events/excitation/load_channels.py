@@ -16,7 +16,6 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
-from multiphi_exudyn.mathematics.response.free_response import is_slow
 from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
 from multiphi_exudyn.mechanics.loads.loads import Load, VaryingLoad
 from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion, StopsMotion
@@ -30,8 +29,8 @@ __all__ = ["LoadChannels", "columns", "load_label", "static_load"]
 class LoadChannels:
     """The channels of loads, added one load after the other."""
 
-    def __init__(self, model: MultiPhiModel, end: float, finer: float, lasting: float) -> None:
-        self._model, self._end, self._finer, self._lasting = model, end, finer, lasting
+    def __init__(self, model: MultiPhiModel, end: float, finer: float) -> None:
+        self._model, self._end, self._finer = model, end, finer
         self.patterns: list[np.ndarray] = []
         self.stops: list[np.ndarray] = []
         self.histories: list[PiecewiseExponential] = []
@@ -69,15 +68,14 @@ class LoadChannels:
             self._add_stop_motion(speeds, PiecewiseExponential.line(1.0))
 
     def add_static(self, load: np.ndarray) -> None:
-        """Set the constant loads (m,), as a channel if they act on damped rigid-body or slow modes, or friction may.
+        """Set the constant loads (m,), as a channel if they act on damped rigid-body modes or friction forces may.
 
-        The free response reads p t / d - p (1 - exp(-d t)) / d^2 or p (1 - cos omega t) / omega^2, which loses
-        round-off / (d t)^2 or / (omega t)^2 for small damping d or frequencies; the response to a channel does not.
+        The free response reads p t / d - p (1 - exp(-d t)) / d^2, which loses round-off / (d t)^2 for small damping d;
+        the response to a channel does not.
         """
         base, self.static = self._model.base, load
-        rigid, slow = base.modes.rigid, is_slow(base.modes.omega, self._lasting)
-        slow[:rigid] = np.any(base.damping[:rigid])
-        if np.any(slow) and (np.any(load[slow]) or self._model.held):
+        rigid = base.modes.rigid
+        if np.any(base.damping[:rigid]) and (np.any(load[:rigid]) or self._model.held):
             self.steady = len(self.histories)
             self._append(load, self._no_stop(), PiecewiseExponential.constant(1.0))
             self.static = np.zeros_like(load)

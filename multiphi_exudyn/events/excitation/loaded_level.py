@@ -20,7 +20,6 @@ from multiphi_exudyn.events.excitation.channels import Channels
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.level.level import Asymptotic, Level
-from multiphi_exudyn.levels.level.sliding import SlidingLevel
 from multiphi_exudyn.mathematics.response.free_response import ModalResponse
 
 __all__ = ["LoadedLevel", "PotentialForm", "StrainForm"]
@@ -124,14 +123,7 @@ class LoadedLevel(Shown):
         return replace(kept, excitation=excitation)
 
     def _under(self, excitation: Excitation) -> LoadedLevel:
-        equilibrium, gaps, acting = self.asymptotic, self.gap_constants, excitation
-        if excitation.steady >= 0 and np.any(self._push):
-            equilibrium = self.level.asymptotic(excitation.static)
-            gaps = equilibrium.gaps
-            patterns = excitation.patterns.copy()
-            patterns[:, excitation.steady] += self._push
-            acting = replace(excitation, patterns=patterns)
-        channels = Channels.of(self.level, acting)
+        channels, equilibrium = Channels.of(self.level, excitation), self.asymptotic
         if excitation.steady >= 0:
             force = channels.force.copy()
             force[:, excitation.steady] += equilibrium.drive
@@ -140,7 +132,7 @@ class LoadedLevel(Shown):
         return LoadedLevel(
             level=channels.extended(self.level, excitation.stops),
             asymptotic=equilibrium,
-            gap_constants=gaps,
+            gap_constants=self.gap_constants,
             excitation=excitation,
             channels=channels,
             static=self,
@@ -182,16 +174,6 @@ class LoadedLevel(Shown):
         base = self.level.base
         given = [pushed[state] for pushed, state in zip(base.pushes_of_states, self.states, strict=True)]
         return np.array([*given, *[0.0] * (len(base.links) - len(given))])
-
-    @property
-    def _push(self) -> np.ndarray:
-        """Load (m,) of the constant forces of its elements that act on a steady channel.
-
-        None where contacts slide, whose friction follows them, nor beside rigid-body modes, which have no equilibrium.
-        """
-        if isinstance(self.level, SlidingLevel) or self.level.base.modes.rigid:
-            return np.zeros(len(self.level.base.directions))
-        return np.asarray(self.level.base.directions @ self.pushes)
 
     @functools.cached_property
     def driven(self) -> bool:
@@ -264,8 +246,6 @@ class LoadedLevel(Shown):
         modal = -self.alone.asymptotic.drive
         if base.general:
             modal += self.modal.vectors.T @ (equilibrium.load - static)  # constant forces of elements
-            if self.excitation.steady >= 0:  # they are on its channel, and so is what they drive
-                modal += np.where(self.modal.squares, 0.0, self.modal.vectors.T @ self._push)
         constant = equilibrium.strain + self.stored - float(static @ y)
         if not q:
             return PotentialForm(constant, modal, self.modal.squares, np.zeros((0, r)), self.follows)

@@ -154,7 +154,7 @@ def CreateMultiPhiBody(
     nodes = interface_nodes(model.structure, interface)
     rows = [node.rows for node in nodes]
     model = holding(model, loads, start, rows)
-    run = Run(model, PROVISIONAL, displacement, velocity, loads, start=start, rewound=True, provisional=True)
+    run = Run(model, PROVISIONAL, displacement, velocity, loads, start=start, rewound=True)
     check_start(run)
     body = MultiPhiBody(name, _motion(run), loads, PROVISIONAL, matchedStepSize, base_warnings_of(run, model, rows))
     moving_surfaces = [link for link in model.links if link.velocity]

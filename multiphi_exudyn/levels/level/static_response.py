@@ -25,7 +25,6 @@ from multiphi_exudyn.mathematics.round_off import FOLLOWING, INDEPENDENT, ZERO, 
 __all__ = ["Asymptotic", "gaps_and_strain", "response_of_neutral_level", "static_response"]
 
 NONE = np.zeros((0, 0))  # rigid-body motions of a structure that has none
-SOFT = 1e-8  # of the largest Omega^2: the flexibility of a softer mode leaves less than half the digits to the others
 
 
 @dataclass(frozen=True)
@@ -159,41 +158,24 @@ def response_of_neutral_level(
 
 
 def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """``static_response`` where the directions of rigid contacts are orthogonal.
-
-    The displacements of soft modes are unknowns beside those of rigid-body modes: their flexibility would outweigh that
-    of the others, P_s f + f_s = Omega_s^2 y_s.
-    """
-    rigid, offsets, vectors = base.modes.rigid, closed_directions.offsets, closed_directions.vectors
-    firm = rigid + int(np.sum(base.squares[rigid:] < SOFT * base.squares.max(initial=0.0)))
-    compliance, elastic_vectors, elastic_load = base.compliance[firm - rigid :], vectors[firm:], load[firm:]
+    """``static_response`` where the directions of rigid contacts are orthogonal."""
+    rigid, compliance, offsets = base.modes.rigid, base.compliance, closed_directions.offsets
+    vectors, elastic_vectors, elastic_load = closed_directions.vectors, closed_directions.vectors[rigid:], load[rigid:]
     sprung = closed_directions.stiffness != 0  # the others have the constant force G
-    spring_compliance = 1 / np.where(sprung, closed_directions.stiffness, 1.0)
-    motions, restoring = _large_motions(base, closed_directions, firm)
+    spring_compliance, resisted = (
+        1 / np.where(sprung, closed_directions.stiffness, 1.0),
+        _resisted_motions(base, closed_directions),
+    )
     deflections = (compliance * elastic_vectors.T).T
-    solve = _solver(elastic_vectors.T @ deflections, spring_compliance, sprung, vectors[:firm].T @ motions, restoring)
-    forces, large_motion = solve(-offsets - sprung * (elastic_load @ deflections), -(load[:firm] @ motions))
+    solve = _solver(elastic_vectors.T @ deflections, spring_compliance, sprung, vectors[:rigid].T @ resisted)
+    forces, rigid_motion = solve(-offsets - sprung * (elastic_load @ deflections), -(load[:rigid] @ resisted))
     total = drop_round_off(
         elastic_load + elastic_vectors @ forces, np.abs(elastic_load) + np.abs(elastic_vectors) @ np.abs(forces)
     )
-    configuration = _with_large_motion(motions, large_motion, compliance * total)
+    configuration = _with_rigid_motion(resisted, rigid_motion, compliance * total)
     violation = offsets + spring_compliance * forces + sprung * (configuration @ vectors)
-    correction, large_motion = solve(-violation, np.zeros(len(large_motion)))  # round-off magnified by soft modes
-    return forces + correction, configuration + _with_large_motion(motions, large_motion, deflections @ correction)
-
-
-def _large_motions(base: ModalBase, closed_directions: ClosedDirections, firm: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return a basis (firm, .) of the rigid-body motions that closed contacts resist, and of soft modes.
-
-    And what they are resisted by beside contacts, omega^2 (.,). firm: the first mode that is neither.
-    """
-    rigid = base.modes.rigid
-    if not firm:
-        return NONE, np.zeros(0)
-    resisted = _resisted_motions(base, closed_directions)
-    basis = np.zeros((firm, resisted.shape[1] + firm - rigid))
-    basis[:rigid, : resisted.shape[1]], basis[rigid:, resisted.shape[1] :] = resisted, np.eye(firm - rigid)
-    return basis, np.concatenate([np.zeros(resisted.shape[1]), base.squares[rigid:firm]])
+    correction, rigid_motion = solve(-violation, np.zeros(len(rigid_motion)))  # round-off magnified by soft modes
+    return forces + correction, configuration + _with_rigid_motion(resisted, rigid_motion, deflections @ correction)
 
 
 def _resisted_motions(base: ModalBase, closed_directions: ClosedDirections) -> np.ndarray:
@@ -204,22 +186,16 @@ def _resisted_motions(base: ModalBase, closed_directions: ClosedDirections) -> n
     return _range(closed_directions.resisting[:rigid], INDEPENDENT * closed_directions.size)
 
 
-def _with_large_motion(motions: np.ndarray, large_motion: np.ndarray, elastic: np.ndarray) -> np.ndarray:
-    """Return coordinates (m,): of rigid-body motions and soft modes, then the other elastic ones."""
-    return np.concatenate([motions @ large_motion, elastic]) if len(motions) else elastic
+def _with_rigid_motion(resisted: np.ndarray, rigid_motion: np.ndarray, elastic: np.ndarray) -> np.ndarray:
+    """Return coordinates (m,): of the resisted rigid-body motions, then elastic ones."""
+    return np.concatenate([resisted @ rigid_motion, elastic]) if len(resisted) else elastic
 
 
 Solver: TypeAlias = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def _solver(
-    flexibility: np.ndarray,
-    spring_compliance: np.ndarray,
-    sprung: np.ndarray,
-    coupling: np.ndarray,
-    restoring: np.ndarray,
-) -> Solver:
-    """Solver for f (d,), z (k,) of [[S F + C, S coupling], [coupling^T, -restoring]] (f, z) = (a, b), S = 0 or 1.
+def _solver(flexibility: np.ndarray, spring_compliance: np.ndarray, sprung: np.ndarray, coupling: np.ndarray) -> Solver:
+    """Solver for f (d,), z (k,) of [[S F + C, S coupling], [coupling^T, 0]] (f, z) = (a, b), S = 0 or 1.
 
     Unknowns and rows are scaled, so that pivots do not depend on units. Where springs cancel and the matrix is
     singular, the solution is the shortest one.
@@ -233,7 +209,6 @@ def _solver(
         coupling.T,
     )
     matrix.flat[: d * (len(matrix) + 1) : len(matrix) + 1] += spring_compliance
-    matrix.flat[d * (len(matrix) + 1) :: len(matrix) + 1] -= restoring
     matrix *= sizes
     lengths = np.abs(matrix).max(axis=1, initial=0.0)
     rows = 1 / np.where(lengths > 0, lengths, 1.0)

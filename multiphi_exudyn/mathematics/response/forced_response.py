@@ -15,8 +15,8 @@ and near to it, at resonance included, the Taylor series of the motion from rest
 
     w_k+1 = T ((s - mu) w_k + p_k) / (k + 1),   w_0 = 0
 
-Two poles that (nearly) coincide, of a critically damped mode or a slow mode, of zero frequency or not, are solved as
-one equation of second order in the same two ways. Nothing grows beyond the load's own size, whatever the distance
+Two poles that (nearly) coincide, of a critically damped mode or a rigid-body mode of slow damping or none, are solved
+as one equation of second order in the same two ways. Nothing grows beyond the load's own size, whatever the distance
 from a pole.
 """
 
@@ -33,7 +33,7 @@ TAYLOR = 1e-18  # of a Taylor series: smaller terms are truncated
 NEAREST_FAR = 0.5  # |s - mu| T from which the finite polynomial is taken for a constant p,
 PER_DEGREE = 0.5  # and more for each degree of p: the finite polynomial loses D! / (|s - mu| T)^D by cancellation
 OUTWEIGHED = 10.0  # times the motion: a finite polynomial up to this size costs at most one digit of the motion
-COINCIDING = 2e-2  # of |s|: poles closer than this are solved together, or than SLOW of 1 / T or mu
+COINCIDING = 2e-2  # of |s|: poles closer than this are solved together; where one is zero, SLOW of 1 / T or mu
 
 
 def particular(
@@ -82,8 +82,8 @@ def _chained(mixing: np.ndarray, forces: np.ndarray, rate: complex, horizon: flo
 def _uncoupled(squares: np.ndarray, delta: np.ndarray, rate: complex, forces: np.ndarray, horizon: float) -> np.ndarray:
     """Return x (K + 1, r) of modes with poles -delta +- sqrt(delta^2 - omega^2)."""
     root = np.sqrt((delta**2 - squares).astype(complex))
-    coinciding = np.where(squares == 0, 0.0, COINCIDING * np.sqrt(np.abs(squares)))
-    together = 2 * np.abs(root) <= np.maximum(coinciding, SLOW * max(1 / horizon, abs(rate)))
+    near = np.where(squares == 0, SLOW * max(1 / horizon, abs(rate)), COINCIDING * np.sqrt(np.abs(squares)))
+    together = 2 * np.abs(root) <= near
     both = _second_order(squares[together], delta[together], rate, forces[:, together], horizon)
     apart = ~together
     fast = -(delta[apart] + root[apart])

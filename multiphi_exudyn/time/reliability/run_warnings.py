@@ -25,7 +25,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "linear range: ..."       result of the model's own validity check
     "cluster: ..."            levels that keep more modes than asked for, so that no modes of one frequency are parted
     "base: ..."               motion or loads outside the base of a large structure (base_warnings.py)
-    "slow mode: ..."          a mode whose equilibrium lies so far away that digits of the motion are lost
+    "slow mode: ..."          a mode whose period is so long that its motion under loads is lost in round-off
     "load pieces: ..."        loads of so many samples or pieces that the run takes long
     "coarse steps: ..."       steps of Exudyn that delay the motion of modes not matched to them
     "truncated statics: ..."  what the modes leave out of a static solution of Exudyn under forces on a body's interface
@@ -69,12 +69,11 @@ from multiphi_exudyn.time.warnings.model_warnings import (
 
 __all__ = ["ModelWarnings", "RunSummary", "warnings_of", "warnings_of_body"]
 
-SLOW = 0.01  # rad: phase of a mode in a run; from it on an equilibrium is at most 2e4 times as far as loads move a mode
-LOST = 1e-8  # of the largest displacement: round-off that spoils no result yet, but may after some ten events
+SLOW = 1e-5  # rad: phase of a mode at the end of a run; below it, a millionth of the response to loads is round-off
+ONLY_ROUND_OFF = 2e-8  # rad: phase at which all is round-off, whose share falls with the square of the phase
 HARDLY = 0.01  # of a period of the fastest kept mode: so short a run is hardly intended
 MANY_PIECES = 2**19  # of loads in a run: some seconds of computing and 250 MB
 PIECE_SECONDS = 1e-5  # that a piece of a load takes in a small model
-EPSILON = float(np.finfo(float).eps)
 PIECE_BYTES = 500  # that it takes there, its segment included
 
 
@@ -82,8 +81,8 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     """Warnings of a run, one sentence each; tolerance: the one that decided its modes.
 
     All warnings but those of the ledger and of truncation are the same for runs of one length in the same levels, and
-    are cached for them, unless friction, a force law that is approximated or at an end of its span, a slow mode, or the
-    model's own check needs the motion of every run.
+    are cached for them, unless friction, a force law that is approximated or at an end of its span, or the model's own
+    check needs the motion of every run.
     """
     record, model = trajectory.ending.record, trajectory.model
     visited, cache = record.visited, record.arrays.levels.told
@@ -94,7 +93,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     if entry is None:
         general = ModelWarnings.of(model, trajectory.segments)
         entry = general, *general.for_run(trajectory)
-        if not (general.needs_motion or general.is_brief(trajectory)):
+        if not general.needs_motion:
             cache.keep(key, entry)
     general, before, after = entry
     if trajectory.ending.numbers[BALANCED] != 1.0 or record.left_out_count:
@@ -116,8 +115,8 @@ class ModelWarnings:
 
     rigid: whether there is a rigid contact. spread: names of those whose effective mass the mesh decides. needs_motion:
     whether friction, a force law that is approximated or at an end of its span, or the model's own check, needs the
-    motion of every run. before, clusters: warnings. fastest: highest frequency of the open level [Hz]. ample: a
-    duration [s] in which all modes move.
+    motion of every run. before, clusters: warnings. fastest: highest frequency of the open level [Hz]. slowest: lowest
+    nonzero frequency of the levels [rad/s]. ample: a duration [s] in which all modes move.
     """
 
     rigid: bool
@@ -126,6 +125,7 @@ class ModelWarnings:
     before: tuple[str, ...]
     clusters: tuple[str, ...]
     fastest: float
+    slowest: float
     ample: float
 
     @classmethod
@@ -151,20 +151,17 @@ class ModelWarnings:
             (*digit_warnings(model), *damping_warnings(model), *missing_modes(model), *static),
             tuple(cluster_warnings(levels)),
             fastest,
+            slowest,
             max(HARDLY / fastest if fastest > 0 else 0.0, SLOW / slowest),
         )
-
-    def is_brief(self, trajectory: Trajectory) -> bool:
-        """Whether a run is so short that some mode hardly moves in it."""
-        return trajectory.t_end - trajectory.start.time < self.ample
 
     def for_run(self, trajectory: Trajectory) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Warnings of a run before and after those of truncation.
 
-        The same for all runs of one length in the same levels, unless ``needs_motion`` or ``is_brief``.
+        The same for all runs in the same levels, unless ``needs_motion``.
         """
         before, after, excitation = self.before, self.clusters, trajectory.segments.levels[0].excitation
-        brief = self.is_brief(trajectory)
+        brief = trajectory.t_end - trajectory.start.time < self.ample
         if brief:
             before = (*_slow(trajectory, self.fastest), *before)
         if brief or self.needs_motion:
@@ -178,7 +175,7 @@ class ModelWarnings:
         model = trajectory.model
         if model.validity is not None:
             yield from model.validity(trajectory)
-        yield from _slow_mode(trajectory)
+        yield from _slow_mode(trajectory, self.slowest)
         if self.needs_motion:
             yield from law_warnings(trajectory)
             yield from span_warnings(trajectory)
@@ -226,26 +223,17 @@ def _struck(trajectory: Trajectory) -> bool:
     return bool(np.any(trajectory.ending.record.impacts[:, 0] > 0))
 
 
-def _slow_mode(trajectory: Trajectory) -> Iterator[str]:
-    """Warning of a slow mode about whose far equilibrium x_inf a level moves: x - x_inf has the round-off of x_inf.
+def _slow_mode(trajectory: Trajectory, slowest: float) -> Iterator[str]:
+    """Warning of a mode with so small a phase at the end of a run that its response is a difference of large terms.
 
-    Constant forces on slow modes of the structure act as a channel instead (load_channels.py). This is left where a
-    level owes a slow mode, or its equilibrium, to contacts and force laws.
+    p (1 - cos omega t) / omega^2 is p t^2 / 2, and its terms are 2 / (omega t)^2 of that.
     """
-    span, far, slowest = trajectory.t_end - trajectory.start.time, 0.0, 0.0
-    for level in trajectory.segments.levels:
-        modal = level.modal
-        slow = (modal.omega > 0) & (modal.omega * span < SLOW)
-        distances = np.abs(modal.vectors[:, slow].T @ level.asymptotic.configuration)
-        if np.max(distances, initial=0.0) > far:
-            far, slowest = float(np.max(distances)), float(modal.omega[slow][np.argmax(distances)])
-    size = math.sqrt(trajectory.segments.sizes(trajectory.t_end)[0]) if far > 0 else 0.0
-    if span > 0 and EPSILON * far > LOST * size:
-        share = min(1.0, EPSILON * far / size) if size > 0 else 1.0
+    span, levels = trajectory.t_end - trajectory.start.time, trajectory.segments.levels
+    if 0 < slowest * span < SLOW and not all(level.excitation.nothing for level in levels):
+        share = min(1.0, ONLY_ROUND_OFF / (slowest * span)) ** 2
         yield (
-            f"slow mode: a mode of {slowest / (2 * math.pi):.3g} Hz has hardly begun in {span:g} s, and its "
-            f"equilibrium lies so far away that {per_cent(share)} of the displacement is round-off at every event; "
-            "hold it, or make its stiffness exactly zero"
+            f"slow mode: a mode of {slowest / (2 * math.pi):.3g} Hz has hardly begun in {span:g} s, so "
+            f"{per_cent(share)} of what loads move it by is round-off; hold it, or make its stiffness exactly zero"
         )
 
 
