@@ -123,8 +123,8 @@ JUDGED = 211  # whether levels leave modes out, so that defects are summed
 # decision, WORKED in a decision, ENTERED_STATE in a level under trial; in an impact RELEASED before it, all touching
 # contacts open, STRUCK after it, STILL without negligible speeds, AFTER in the level of the contacts that stay closed
 CURRENT, REACHED, WORKED, ENTERED_STATE, RELEASED, STRUCK, STILL, AFTER = range(120, 192, 9)
-# in all modes: GIVEN and SLOWED before and after the impact at the start; COMPRESSED, in levels too, after the
-# compression of an impact with friction and restitution
+# in all modes: GIVEN and SLOWED before and after the impact at the start; COMPRESSED, in levels too, after a part of an
+# impact: the compression of one with friction and restitution, a further one of contacts that are driven back
 GIVEN, SLOWED, COMPRESSED = range(234, 261, 9)
 LIMITS, STATIC_LIMITS = 200, 201  # of rigid friction; mu at compliant contacts without tangential spring; else zero
 TOGETHER = 202  # whether friction at rest has been decided together at this instant

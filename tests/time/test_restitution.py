@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import scipy.integrate
+from lawful import assert_lawful
 from numpy.testing import assert_allclose
 from small_structures import chain, random_structure
 
@@ -121,6 +122,55 @@ class TestBallsInARow:
         floors = [mp.UnilateralContact(at, at, 1.0, restitution=e) for at, e in (("a", 0.5), ("b", 0.9))]
         run = mp.simulate(mp.MultiPhiModel(structure, floors, modes="all"), 1.5, velocity=[-1.0, -1.0])
         assert_allclose(run.velocity(1.5), [0.5, 0.9], rtol=1e-14)
+
+
+class TestDrivenBack:
+    """At the start a mass that touches a wall and a second mass strikes the wall, and is thrown against the mass."""
+
+    @staticmethod
+    def thrown(masses, e_wall, e_mass, velocity, modes="all"):
+        structure = mp.LinearStructure(np.diag(masses), [[2.0, -2.0], [-2.0, 2.0]], points={"a": 0, "b": 1})
+        wall = mp.UnilateralContact("wall", {"a": -1.0}, 0.0, restitution=e_wall)
+        mass = mp.UnilateralContact("mass", {"a": 1.0, "b": -1.0}, 0.0, restitution=e_mass)
+        loads = [mp.ConstantLoad("a", 10.0)]
+        run = mp.simulate(mp.MultiPhiModel(structure, [wall, mass], modes=modes), 3.0, None, velocity, loads)
+        return run, loads, (np.zeros(2), np.array(velocity))
+
+    @pytest.mark.parametrize("e", [0.5, 1.0])
+    @pytest.mark.parametrize("masses", [(4.0, 4.0), (1.0, 4.0), (4.0, 1.0), (3.0, 1.0)])
+    @pytest.mark.parametrize("velocity", [(2.0, 0.0), (1.0, -3.0), (3.0, 1.0)])
+    def test_it_is_struck_again_in_the_state_that_the_run_begins_with(self, e, masses, velocity):
+        run, loads, start = self.thrown(masses, e, e, velocity)
+        assert_lawful(run, loads, start, round_off=1e-11)
+        before, after = (0.5 * np.dot(masses, np.square(v)) for v in (velocity, run.velocity(0.0)))
+        struck = sum(event.loss.impact for event in run.events if event.time == 0.0)
+        assert struck == pytest.approx(before - after, abs=1e-12)
+        assert e < 1.0 or struck == pytest.approx(0.0, abs=1e-12)
+
+    def test_all_impacts_at_the_start_are_those_of_all_modes(self):
+        """One mode of five coordinates: the impulses, and what they lose, are those of the whole structure."""
+        contacts = [mp.UnilateralContact(at, row, 0.0, restitution=0.8) for at, row in (("a", {"m0": -1.0}),)]
+        contacts.append(mp.UnilateralContact("b", {"m0": 1.0, "m1": -1.0}, 0.0, restitution=0.8))
+        runs = [
+            mp.simulate(mp.MultiPhiModel(chain(5), contacts, modes=modes), 1e-9, None, [2.0, -1.0, 0.5, 0.1, -0.3])
+            for modes in (1, "all")
+        ]
+        told = [[(e.contact, e.kind, e.impulse) for e in run.events if e.impulse] for run in runs]
+        assert [t[:2] for t in told[0]] == [t[:2] for t in told[1]]
+        assert len(told[0]) == 2
+        assert_allclose([t[2] for t in told[0]], [t[2] for t in told[1]], rtol=1e-13)
+        assert runs[0].ledger.impact == pytest.approx(runs[1].ledger.impact, rel=1e-12)
+        assert runs[0].ledger.residual == pytest.approx(0.0, abs=1e-12)
+
+    @pytest.mark.parametrize(("e_wall", "e_mass"), [(1.0, 0.0), (1.0, 0.5), (0.5, 0.0), (0.0, 0.5), (0.5, 1.0)])
+    @pytest.mark.parametrize("masses", [(1.0, 1.0), (4.0, 1.0), (1.0, 4.0)])
+    @pytest.mark.parametrize("velocity", [(2.0, 0.0), (2.0, 1.0), (1.0, -3.0)])
+    def test_a_contact_of_a_smaller_restitution_that_leaves_its_stop_gains_nothing(
+        self, e_wall, e_mass, masses, velocity
+    ):
+        run, loads, start = self.thrown(masses, e_wall, e_mass, velocity)
+        assert_lawful(run, loads, start, round_off=1e-11)
+        assert run.ledger.impact >= -1e-12
 
 
 def test_a_moving_stop_gives_its_speed_on():

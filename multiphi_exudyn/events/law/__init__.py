@@ -64,12 +64,13 @@ the functions that implement it:
    -> changes.set_requested_states, phases.is_denied, decision.apply_requests, impact.add_friction_rows,
    resting.sliding_level, rebounds.flag_touching
 11. A rigid contact with restitution e that strikes leaves its stop with -e times its velocity. So do all contacts that
-   touch and are struck with it, in one impact (Moreau); coupled ones must have one e. A contact that others drive back
-   to its stop is struck again at the same instant. If any of them has friction, e is that of impulses: an impact
-   without restitution, then one with at least e times its impulses (Poisson). A bounce that is too low or too short to
-   be resolved is the last: it takes as long as all bounces that would follow, and at its end e is zero.
-   -> rebounds.flag_touching, rebounds.set_rebound_speeds, rebounds.collide_and_rebound, rebounds.repeat_impacts,
-   bounces.last_bounce, bounces.mark_last_bounces
+   touch and are struck with it, in one impact (Moreau); coupled ones must have one e. A touching contact that leaves
+   its stop has at least the e of those that are struck, or it would gain energy. A contact that others drive back to
+   its stop is struck again at the same instant, at the start too. If any of them has friction, e is that of impulses:
+   an impact without restitution, then one with at least e times its impulses (Poisson). A bounce that is too low or too
+   short to be resolved is the last: it takes as long as all bounces that would follow, and at its end e is zero.
+   -> rebounds.flag_touching, rebounds.set_rebound_speeds, rebounds.lend_restitutions, rebounds.collide_and_rebound,
+   rebounds.repeat_impacts, bounces.last_bounce, bounces.mark_last_bounces
 12. Rigid friction elements that stick, reverse or begin to slip at an instant are decided together, those at contacts
    that are not rigid with their present mu N. Their forces are within their limits, static ones until they slip, and
    complementary to their accelerations. Of the elements that then fall from their static limits those that reverse

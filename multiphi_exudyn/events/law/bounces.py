@@ -10,6 +10,7 @@ from multiphi_exudyn.events.arrays import (
     CHANGE_WIDTH,
     CHANGES,
     CHANNELS,
+    COMPRESSED,
     ELEMENTS,
     EXIT_COUNT,
     FAILED,
@@ -36,7 +37,6 @@ from multiphi_exudyn.events.arrays import (
     SPEED,
     SPEEDS,
     STATES,
-    STILL,
     STRUCK,
     TOUCHING,
     WANTED,
@@ -86,12 +86,12 @@ def row_speed(ints: Ints, numbers: Numbers, state: int, k: int) -> float:
 
 
 @compiled
-def apply_further_impact(ints: Ints, numbers: Numbers, count: int) -> int:
-    """Replace STRUCK by the state after one more impact, with the gap velocities WANTED; return OK or FAILED."""
+def apply_further_impact(ints: Ints, numbers: Numbers, state: int, count: int, losses: int) -> int:
+    """Replace a struck state by the one after one more impact, with the gap velocities WANTED; return OK or FAILED."""
     touching, further = ints[TOUCHING], ints[FURTHER]
-    if collide(ints, numbers, STRUCK, touching, count, 0, ints[WANTED], -1, STILL, further, LOST_IN_IMPACT) < 0:
+    if collide(ints, numbers, state, touching, count, 0, ints[WANTED], -1, COMPRESSED, further, losses) < 0:
         return FAILED
-    copy_state(ints, numbers, STILL, STRUCK)
+    copy_state(ints, numbers, COMPRESSED, state)
     for k in range(count):
         numbers[ints[IMPULSES] + k] += numbers[further + k]
     return OK
@@ -127,7 +127,9 @@ def last_bounce(ints: Ints, numbers: Numbers, count: int) -> int:
             numbers[wanted] = speed / (1.0 - restitution)
             ints[ints[LASTS] + contact] = 1
             last += 1
-    return last if last == 0 or apply_further_impact(ints, numbers, count) == OK else FAILED
+    if last > 0 and apply_further_impact(ints, numbers, STRUCK, count, LOST_IN_IMPACT) < 0:
+        return FAILED
+    return last
 
 
 @compiled

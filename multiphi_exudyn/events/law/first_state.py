@@ -58,7 +58,7 @@ from multiphi_exudyn.events.arrays import (
 )
 from multiphi_exudyn.events.law.changes import NO_REQUEST, bears_no_impulse, clear
 from multiphi_exudyn.events.law.decision import decide
-from multiphi_exudyn.events.law.rebounds import collide_and_rebound, set_rebound_speeds
+from multiphi_exudyn.events.law.rebounds import collide_and_rebound, repeat_impacts, set_rebound_speeds
 from multiphi_exudyn.events.law.striking import impact, record_impact_changes
 from multiphi_exudyn.events.states.energies import lose
 from multiphi_exudyn.events.states.maps import find_level, find_map, move
@@ -153,6 +153,8 @@ def strike(ints: Ints, numbers: Numbers, waves: Waves, level: int, count: int) -
     ints[CHANGE_COUNT] = 0
     bouncing = set_rebound_speeds(ints, numbers, GIVEN, count)
     if bouncing < 0 or collide_and_rebound(ints, numbers, GIVEN, count, bouncing, SLOWED, LOST_AT_START) < 0:
+        return FAILED
+    if bouncing > 0 and repeat_impacts(ints, numbers, SLOWED, count, LOST_AT_START) < 0:
         return FAILED
     record_impact_changes(ints, numbers, count)
     return strikes

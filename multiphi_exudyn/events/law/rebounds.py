@@ -1,6 +1,10 @@
 """Rebounds: rigid contacts with restitution leave their stops after an impact, by sentence 11 of the law (events/law).
 
-    H v+ + e H v- >= 0,  p >= 0, complementary;  WANTED = -e H v-                                            (Moreau)
+    H v+ + E H v- >= 0,  p >= 0, complementary;  WANTED = -E H v-                                            (Moreau)
+
+It changes the kinetic energy by p (1 - E) H v-/2. E = diag(e) of the contacts that are struck, H v- < 0. A touching
+contact that leaves its stop, H v- > 0, has the largest of its own e and of theirs, e_s: then p (1 - E) H v- is at most
+(1 - e_s) p H v-, and that is not positive.
 
 Beside friction that would generate energy if the direction of slip turns (T. R. Kane). There all contacts are struck
 without restitution first, with impulses p, and then once more with at least e p (Poisson), H v+ >= 0, both times within
@@ -40,7 +44,6 @@ from multiphi_exudyn.events.arrays import (
     SIGNAL,
     STATES,
     STATIC_FRICTIONS,
-    STRUCK,
     TOUCHING,
     UNSETTLED,
     WANTED,
@@ -104,7 +107,13 @@ def set_rebound_speeds(ints: Ints, numbers: Numbers, state: int, count: int) -> 
         speed = 0.0 if restitution == 0.0 else row_speed(ints, numbers, state, k)
         numbers[ints[WANTED] + k] = -restitution * speed if speed != 0.0 else 0.0
         bouncing += 1 if numbers[ints[WANTED] + k] > 0.0 else 0
-    return check_restitutions(ints, numbers, state, count) if bouncing > 0 else 0
+    if bouncing == 0:
+        return 0
+    find_coupled(ints, numbers, ints[state + LEVEL], count)
+    if check_restitutions(ints, numbers, state, count) < 0:
+        return FAILED
+    lend_restitutions(ints, numbers, state, count)
+    return bouncing
 
 
 @compiled
@@ -145,14 +154,12 @@ def collide_and_rebound(
 
 
 @compiled
-def check_restitutions(ints: Ints, numbers: Numbers, state: int, count: int) -> int:
-    """Return how many touching contacts are to leave their stops; FAILED if coupled ones have different restitution."""
-    level, groups, bouncing = ints[state + LEVEL], ints[GROUPS], 0
-    r = ints[level + MODES]
+def find_coupled(ints: Ints, numbers: Numbers, level: int, count: int) -> None:
+    """Set GROUPS (count,): equal numbers of touching contacts that impulses couple; ROWS must have been filled."""
+    groups, r = ints[GROUPS], ints[level + MODES]
     n = r + ints[CHANNELS]
     for k in range(count):
         ints[groups + k] = k
-        bouncing += 1 if numbers[ints[WANTED] + k] > 0.0 else 0
     for k in range(count):
         for j in range(k):
             one, other = ints[ROWS] + k * n, ints[ROWS] + j * n
@@ -161,9 +168,14 @@ def check_restitutions(ints: Ints, numbers: Numbers, state: int, count: int) -> 
                 joined, group = ints[groups + k], ints[groups + j]
                 for i in range(count):
                     ints[groups + i] = group if ints[groups + i] == joined else ints[groups + i]
+
+
+@compiled
+def check_restitutions(ints: Ints, numbers: Numbers, state: int, count: int) -> int:
+    """Return OK, or FAILED if coupled contacts (GROUPS) that are struck together have different restitution."""
     for i in range(ints[ELEMENTS]):
         ints[ints[CAUSED_BY] + i] = 0
-    mixed = 0
+    groups, mixed = ints[GROUPS], 0
     for k in range(count):
         contact, speed = ints[ints[TOUCHING] + k], row_speed(ints, numbers, state, k)
         for j in range(k):
@@ -176,20 +188,41 @@ def check_restitutions(ints: Ints, numbers: Numbers, state: int, count: int) -> 
                 ints[ints[CAUSED_BY] + other_contact] = 1
                 mixed = 1
     ints[CAUSE] = MIXED if mixed == 1 else ints[CAUSE]
-    return FAILED if mixed == 1 else bouncing
+    return FAILED if mixed == 1 else OK
 
 
 @compiled
-def repeat_impacts(ints: Ints, numbers: Numbers, count: int) -> int:
-    """11. Repeat impacts on STRUCK until no contact is driven back to its stop by the others; return OK or FAILED."""
+def lend_restitutions(ints: Ints, numbers: Numbers, state: int, count: int) -> None:
+    """11. Let contacts that leave their stops have at least the e of those that are struck and coupled with them.
+
+    With a smaller e it would gain more energy than the others lose. ROWS and GROUPS must have been filled.
+    """
+    groups, wanted = ints[GROUPS], ints[WANTED]
+    for k in range(count):
+        speed = row_speed(ints, numbers, state, k)
+        for j in range(count if speed > 0.0 else 0):
+            struck_speed = row_speed(ints, numbers, state, j)
+            if struck_speed < 0.0 and ints[groups + k] == ints[groups + j]:
+                lent = numbers[wanted + j] / struck_speed * speed
+                numbers[wanted + k] = min(numbers[wanted + k], lent)
+
+
+@compiled
+def repeat_impacts(ints: Ints, numbers: Numbers, state: int, count: int, losses: int) -> int:
+    """11. Repeat impacts on a struck state until no contact is driven back to its stop by others; return OK or FAILED.
+
+    ``losses`` sums what they lose.
+    """
     for _ in range(BLOWS):
         approaching = 0
-        fill_rows(ints, numbers, ints[STRUCK + LEVEL], ints[TOUCHING], count, 0)
+        fill_rows(ints, numbers, ints[state + LEVEL], ints[TOUCHING], count, 0)
         for k in range(count):
-            approaching += 1 if row_speed(ints, numbers, STRUCK, k) < 0.0 else 0
+            approaching += 1 if row_speed(ints, numbers, state, k) < 0.0 else 0
         if approaching == 0:
             return OK
-        if set_rebound_speeds(ints, numbers, STRUCK, count) < 0 or apply_further_impact(ints, numbers, count) < 0:
+        if set_rebound_speeds(ints, numbers, state, count) < 0:
+            return FAILED
+        if apply_further_impact(ints, numbers, state, count, losses) < 0:
             return FAILED
     ints[CAUSE] = UNSETTLED
     return FAILED

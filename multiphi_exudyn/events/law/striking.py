@@ -95,7 +95,7 @@ def impact(ints: Ints, numbers: Numbers, waves: Waves) -> int:
         return FAILED
     if collide_and_rebound(ints, numbers, RELEASED, count, bouncing, STRUCK, LOST_IN_IMPACT) < 0:
         return FAILED
-    if bouncing > 0 and repeat_impacts(ints, numbers, count) < 0:
+    if bouncing > 0 and repeat_impacts(ints, numbers, STRUCK, count, LOST_IN_IMPACT) < 0:
         return FAILED
     same = same_speed(ints, numbers, RELEASED, STRUCK)
     if same == 1:

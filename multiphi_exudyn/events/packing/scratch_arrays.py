@@ -62,8 +62,7 @@ class ScratchArrays:
             self.reserve_state(state, n, exits)
             if old[a.LEVEL]:
                 self._carry_over(state, old)
-        if self._rough:
-            self.reserve_state(a.COMPRESSED, self._wide(n), max(exits, self._elements))
+        self.reserve_state(a.COMPRESSED, self._wide(n), max(exits, self._elements))
 
     def reserve_state(self, state: int, n: int, exits: int) -> None:
         """Reserve memory for a state of n coordinates and so many exits."""
