@@ -8,8 +8,8 @@ EXACT = 1e-11  # of the terms of a force or a velocity, and of displacements abo
 INTERVALS = 60  # within segments, where the laws are checked
 
 
-def assert_lawful(run, loads=(), start=None, round_off=1e-12):
-    """The run and its laws; start: x, x' that it was given, None: not checked; round_off: of energies about 1."""
+def assert_lawful(run, loads=(), round_off=1e-12, start=None):
+    """The run and its laws; round_off: of energies about 1; start: x, x' that it was given, None: not checked."""
     assert run.status == "ok", run.message
     assert broken_laws(run, loads, start, intervals=INTERVALS, exact=EXACT) == []
     assert run.ledger.friction >= 0

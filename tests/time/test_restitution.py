@@ -141,7 +141,7 @@ class TestDrivenBack:
     @pytest.mark.parametrize("velocity", [(2.0, 0.0), (1.0, -3.0), (3.0, 1.0)])
     def test_it_is_struck_again_in_the_state_that_the_run_begins_with(self, e, masses, velocity):
         run, loads, start = self.thrown(masses, e, e, velocity)
-        assert_lawful(run, loads, start, round_off=1e-11)
+        assert_lawful(run, loads, 1e-11, start)
         before, after = (0.5 * np.dot(masses, np.square(v)) for v in (velocity, run.velocity(0.0)))
         struck = sum(event.loss.impact for event in run.events if event.time == 0.0)
         assert struck == pytest.approx(before - after, abs=1e-12)
@@ -169,7 +169,7 @@ class TestDrivenBack:
         self, e_wall, e_mass, masses, velocity
     ):
         run, loads, start = self.thrown(masses, e_wall, e_mass, velocity)
-        assert_lawful(run, loads, start, round_off=1e-11)
+        assert_lawful(run, loads, 1e-11, start)
         assert run.ledger.impact >= -1e-12
 
 

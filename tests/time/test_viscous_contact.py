@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from lawful import assert_lawful
 from numpy.testing import assert_allclose
 from small_structures import chain
 from true_law import against_viscous
@@ -158,3 +159,43 @@ def test_struck_off_its_stop_it_lets_go_at_once(friction, restitution):
     assert run.contact_force("soft", struck - 1e-9) > 50.0
     assert [event.time for event in run.events if event.contact == "soft" and event.kind == "open"] == [struck]
     assert not broken_laws(run, [], start)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("k", [1.0, 1000.0])
+def test_reached_at_the_instant_of_an_impact_that_turns_it_back_it_never_pushes_nor_pulls(restitution, k):
+    """A rigid wall is struck at the same instant: the velocity after the impact leads away from the damped stop."""
+    structure = mp.LinearStructure(np.eye(2), np.zeros((2, 2)), None, {"x": 0, "y": 1})
+    soft = mp.UnilateralContact("soft", "y", 0.0, k, damping=50.0)
+    wall = mp.UnilateralContact("wall", {"x": 1.0, "y": 1.0}, 0.0, restitution=restitution)
+    start = np.array([1.0, 0.5]), np.array([-2.0, -1.0])
+    for contacts in ([soft, wall], [wall, soft]):
+        run = mp.simulate(mp.MultiPhiModel(structure, contacts, modes="all"), 1.0, *start)
+        assert_lawful(run, (), start=start)
+        assert run.ledger.damping == 0.0
+        turned = 1.5 * (1 + restitution)
+        assert_allclose(run.velocity(1.0), [turned - 2.0, turned - 1.0], atol=1e-14)
+
+
+@pytest.mark.parametrize("damping", [10.0, 30.0, 100.0, 300.0])
+@pytest.mark.parametrize("masses", [(2.0, 1.0), (1.0, 1.0), (1.0, 3.0)])
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
+def test_open_inside_it_stays_open_where_one_guide_takes_over_from_the_other(damping, masses, share):
+    """Two rigid guides that face each other hold x + y; the load across them turns while the damped stop is left."""
+    structure = mp.LinearStructure(np.diag(masses), [[5.0, -5.0], [-5.0, 5.0]], None, {"x": 0, "y": 1})
+    across = {"x": 1.0, "y": 1.0}
+    guides = [mp.UnilateralContact(name, dict.fromkeys(across, s), 0.0) for name, s in (("low", 1.0), ("high", -1.0))]
+    model = mp.MultiPhiModel(structure, [*guides, mp.UnilateralContact("soft", "y", 0.0, 1.0, damping)], modes="all")
+    start = np.array([-1.0, 1.0]), np.array([-1.0, 1.0])
+    alone = mp.simulate(model, 4.0, *start)
+    let_go = next(e.time for e in alone.events if e.contact == "soft" and e.kind == "open")
+    left = next(t for t in np.linspace(let_go, 4.0, 2000) if alone.gap("soft", t) > 0)
+    turn = let_go + share * (left - let_go)
+    width = 0.5 * min(turn - let_go, left - turn)
+    loads = [mp.SampledLoad(across, [0.0, turn - width, turn + width, 4.0], [-20.0, -20.0, 20.0, 20.0])]
+    run = mp.simulate(model, 4.0, *start, loads)
+    assert_lawful(run, loads, 1e-10, start)
+    taken = [e.time for e in run.events if e.contact == "high" and e.kind == "close" and let_go < e.time < left]
+    assert taken
+    assert float(run.gap("soft", taken[0])) < 0
+    assert_allclose(run.displacement(T / 3), alone.displacement(T / 3), atol=1e-11)

@@ -42,8 +42,9 @@ the functions that implement it:
    level with it closed has risen to zero. It may stay closed only with a force >= 0, and may open if its force would be
    negative. Truncation may leave it a force there at the instant at which it opens: it opens if this falls, and closes
    when it has risen to as much again. If others that change at the instant make its force negative it opens too, after
-   a change of its own.
-   -> switching.would_pull_if_closed, monitoring.wait_for, decision.classify_refusals
+   a change of its own. It bears no impulse: at the instant of an impact it keeps its state until that is over, and is
+   decided with the velocities after it.
+   -> switching.would_pull_if_closed, monitoring.wait_for, decision.classify_refusals, decision.follows_impact
 8. A force law requests the next segment at either end of its present one, and always changes. If truncation has moved
    its displacement further, it requests the segment in which its displacement lies. It goes on at the same instant
    until its segment contains its displacement, but does not return to the segment that it has just left.

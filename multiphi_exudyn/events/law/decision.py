@@ -269,7 +269,8 @@ def apply_requests(ints: Ints, numbers: Numbers, waves: Waves, requests: int) ->
     """10. Set WORKED to the state, with its phases, after the requests (c,) are decided; return OK, NEED or FAILED.
 
     HEARD flags all contacts that touch at this instant. FREED flags those of them whose reaction has fallen to zero at
-    it. A friction spring that reaches its limit sticks in an impact.
+    it. A friction spring that reaches its limit sticks in an impact. What a viscous contact requests is left for the
+    next decision, after the impact.
     """
     c, striking, states = ints[ELEMENTS], ints[STRIKING], ints[ints[WORKED + LEVEL] + STATES]
     set_requested_states(ints, numbers, requests)
@@ -285,6 +286,8 @@ def apply_requests(ints: Ints, numbers: Numbers, waves: Waves, requests: int) ->
         if numbers[ints[SPRINGS] + i] > 0.0 and ints[states + i] == sticks and requested > sticks:
             requested = sticks  # its velocity after the impact decides whether it slips
         ints[ints[COMPLIANT_KEY] + i] = OPEN if rigid else requested
+        if follows_impact(ints, requests, i) == 1:
+            ints[ints[COMPLIANT_KEY] + i] = ints[states + i]
         if (
             bears_no_impulse(ints, numbers, i) == 1 and ints[ints[COMPLIANT_KEY] + i] >= sticks
         ):  # slips, in either direction
@@ -298,6 +301,9 @@ def apply_requests(ints: Ints, numbers: Numbers, waves: Waves, requests: int) ->
         if status < 0 or remaining == 0:
             return status
         return switch(ints, numbers, waves, requests)
+    for i in range(c):
+        if follows_impact(ints, requests, i) == 1:
+            ints[ints[HEARD] + i] = 0
     status = impact(ints, numbers, waves)
     if status < 0:
         return status
@@ -306,3 +312,12 @@ def apply_requests(ints: Ints, numbers: Numbers, waves: Waves, requests: int) ->
         return close_without_impact(ints, numbers, waves, requests)
     enter(ints, numbers, waves, AFTER)
     return OK
+
+
+@compiled
+def follows_impact(ints: Ints, requests: int, element: int) -> int:
+    """7. Return 1 if a viscous contact requests to close or to open: the velocities after an impact decide on that."""
+    requested, opened = ints[requests + element], ints[ints[ints[WORKED + LEVEL] + STATES] + element] == OPEN
+    if requested == NO_REQUEST or ints[ints[KINDS] + element] != VISCOUS:
+        return 0
+    return 1 if opened or requested == OPEN else 0
