@@ -185,6 +185,22 @@ def test_it_names_a_mass_that_goes_on_into_its_stop():
     assert "floor goes on into its stop" in _laws(broken_laws(through, [WEIGHT], START))
 
 
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+@pytest.mark.parametrize("round_offs", [-4, 0, 4, 16])
+@pytest.mark.parametrize("knot", [0.9, 1.0])
+@pytest.mark.parametrize("course", [mp.Harmonic(1.0, 0.25), mp.Harmonic(0.5, 0.5, 1.5 * math.pi)])
+def test_it_says_nothing_of_a_mass_that_arrives_where_its_load_changes(course, knot, round_offs, restitution):
+    """Round-off leaves a gap at that instant, and the impact is a few digits of the time after it."""
+    structure = mp.LinearStructure([[1.0]], [[0.0]], points={"x": 0})
+    loads = [mp.SampledLoad("x", [0.0, knot, 2.0, 4.0], [-2.0, -2.0, 0.0, 2.0]), mp.StopMotion("floor", course)]
+    stop = course.amplitude * math.cos(2 * math.pi * course.frequency_hz * knot + course.phase)
+    start = np.array([2.0 + round_offs * 2.0**-52]), np.array([(stop - 2.0) / knot + knot])
+    floor = mp.UnilateralContact("floor", "x", 0.0, restitution=restitution)
+    trajectory = mp.simulate(mp.MultiPhiModel(structure, [floor], modes="all"), 3.0, *start, loads)
+    assert any(abs(event.time - knot) < 1e-13 for event in trajectory.events)
+    assert broken_laws(trajectory, loads, start) == []
+
+
 def test_it_names_a_start_that_is_not_the_one_that_was_given(trajectory):
     x, v = START
     assert _laws(broken_laws(trajectory, [WEIGHT], (x + 1e-5, v))) == {"displacement jumps"}

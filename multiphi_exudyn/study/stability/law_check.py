@@ -588,6 +588,19 @@ def _touches(run: _Run, contact: UnilateralContact) -> np.ndarray:
     return np.asarray(np.abs(gap) <= TOUCHES / run.exact * run.length_of(contact, run.x_sides[1], z))
 
 
+def _is_struck_next(run: _Run, contact: UnilateralContact, speed: np.ndarray) -> np.ndarray:
+    """Whether (k,) the contact is struck before it has gone on with these speeds for more than round-off of its gap.
+
+    A load may change where a mass arrives: what is left of the gap is round-off, and the impact just after that instant.
+    """
+    name, times = contact.name, run.instants
+    z, _ = run.stop(contact, times)
+    struck = [e.time for e in run.trajectory.events if (e.contact == name and e.impulse) or name in dict(e.shared)]
+    following = np.append(struck, np.inf)[np.searchsorted(struck, times, side="right")]
+    length = TOUCHES / run.exact * run.length_of(contact, run.x_sides[1], z)
+    return np.asarray(speed <= length / (following - times))
+
+
 def _rebounds(run: _Run, contact: UnilateralContact, impulse: np.ndarray, alone: np.ndarray) -> list[str]:
     """The contact does not go on into its stop; struck alone and once it leaves it with -e times its velocity."""
     row, name, times = run.rows[contact.name], contact.name, run.instants
@@ -595,7 +608,8 @@ def _rebounds(run: _Run, contact: UnilateralContact, impulse: np.ndarray, alone:
     _, z_rate = run.stop(contact, times)
     arriving, leaving = (row @ v - z_rate for v in run.v_sides)
     round_off = run.exact * (run.speed * np.sum(scaled) + np.abs(z_rate)) + run.smallest_bounce * np.sum(scaled)
-    into = np.where(_touches(run, contact) & run.has_both_sides, -leaving, 0.0)
+    goes_on = _touches(run, contact) & run.has_both_sides & ~_is_struck_next(run, contact, -leaving)
+    into = np.where(goes_on, -leaving, 0.0)
     found = _told(f"{name} goes on into its stop", into, round_off, times, "velocities")
     judged = alone & (impulse * (scaled @ scaled) > round_off)
     if not contact.further:
