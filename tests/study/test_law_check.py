@@ -201,6 +201,26 @@ def test_it_says_nothing_of_a_mass_that_arrives_where_its_load_changes(course, k
     assert broken_laws(trajectory, loads, start) == []
 
 
+@pytest.mark.parametrize("damping", [1.0, 10.0])
+@pytest.mark.parametrize("knot", [0.8, 1.0, 1.3])
+@pytest.mark.parametrize("force", [1.0, 4.0, 300.0])
+def test_it_knows_the_round_off_of_a_load_that_passes_through_zero(force, knot, damping):
+    """Clamped by rigid and damped stops of both sides: where the load is about zero, so are all forces."""
+    structure = mp.LinearStructure([[1.0]], [[0.0]], points={"x": 0})
+    stops = [
+        mp.UnilateralContact("far", "x", 1.0),
+        mp.UnilateralContact("soft", "x", 0.0, 10.0, damping),
+        mp.UnilateralContact("rigid", {"x": -1.0}, 0.0),
+        mp.UnilateralContact("hard", {"x": -1.0}, 0.0, 100.0, 1.0),
+    ]
+    loads = [mp.SampledLoad("x", [0.0, knot, 2.0, 4.0], [force, 0.0, force, 0.0])]
+    start = np.array([-1.0]), np.array([0.0])
+    trajectory = mp.simulate(mp.MultiPhiModel(structure, stops, modes="all"), 5.0, *start, loads)
+    assert broken_laws(trajectory, loads, start) == []
+    pulled = Altered(trajectory, contact_force=_of("rigid", lambda told, t: told - 1e-7 * force))
+    assert broken_laws(pulled, loads, start)
+
+
 def test_it_names_a_start_that_is_not_the_one_that_was_given(trajectory):
     x, v = START
     assert _laws(broken_laws(trajectory, [WEIGHT], (x + 1e-5, v))) == {"displacement jumps"}

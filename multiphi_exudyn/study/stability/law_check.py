@@ -56,7 +56,8 @@ EVENTS = 20  # instants of events, and as many ends of segments
 EVEN = 10  # further instants, for the size of the motion
 EXACT = 1e-8  # of the terms of a sum: larger is no round-off
 INTERPOLATED = 1e-4  # the same where a load is interpolated: its tolerance holds for the motion, not for the force
-FAR = 1e-2  # of the largest displacement: its round-off is that of what other masses do not move
+FAR = 1e-2  # of the largest displacement: its round-off is that of what other masses do not move; of a load's largest
+# force the same, where it is about zero
 MOVES = 1e-6  # of the largest velocity: slower slip has no direction
 ENERGY = 1e-8  # of the energies turned over
 NO_MOTION = 1e-6  # of what the forces could move a free mass during the run: less is no motion
@@ -363,9 +364,14 @@ def _told(
 
 
 def _force_terms(run: _Run, inside: _Inside) -> np.ndarray:
-    """Absolute terms (n, k) of the equation of motion over the roots of the masses: also those that springs make."""
+    """Absolute terms (n, k) of the equation of motion over the roots of the masses: also those that springs make.
+
+    A load that passes through zero has there the round-off of its course, and balances forces that have it too.
+    """
     x, v, a = (inside.worst(values) for values in (inside.x, inside.v, inside.a))
-    terms = abs(run.mass) @ a + abs(run.stiffness) @ x + sum(np.abs(f) for f in run.forces(inside.times))
+    terms = abs(run.mass) @ a + abs(run.stiffness) @ x
+    for here, anywhere in zip(run.forces(inside.times), run.forces(run.instants), strict=True):
+        terms = terms + np.maximum(np.abs(here), FAR * np.max(np.abs(anywhere), axis=1, initial=0.0)[:, None])
     if run.has_equation and run.damping is not None:
         terms = terms + abs(run.damping) @ v
     for law in run.laws:
@@ -591,7 +597,7 @@ def _touches(run: _Run, contact: UnilateralContact) -> np.ndarray:
 def _is_struck_next(run: _Run, contact: UnilateralContact, speed: np.ndarray) -> np.ndarray:
     """Whether (k,) the contact is struck before it has gone on with these speeds for more than round-off of its gap.
 
-    A load may change where a mass arrives: what is left of the gap is round-off, and the impact just after that instant.
+    A load may change where a mass arrives: what is left of the gap is round-off, and the impact comes just afterwards.
     """
     name, times = contact.name, run.instants
     z, _ = run.stop(contact, times)
