@@ -9,6 +9,7 @@ import itertools
 import numpy as np
 import pytest
 import scipy.linalg
+from lawful import assert_lawful
 from numpy.testing import assert_allclose
 from small_structures import chain
 
@@ -382,3 +383,23 @@ def test_three_of_one_motion_beside_a_stiff_spring_let_go_and_stick_as_one(sprin
         assert run.status == "ok"
         found.append(run.displacement(np.linspace(0, 6, 41)))
     assert_allclose(*found, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("damping", [0.0, 1.0])
+@pytest.mark.parametrize("stiffness", [4.0, 50.0])
+@pytest.mark.parametrize("far", [1.0, 10.0])
+@pytest.mark.parametrize("earlier", [1e-12, 2e-13, 5e-14, 0.0, -2e-13])
+def test_a_rough_stop_that_opens_as_another_element_comes_to_rest_keeps_its_slip_velocity(
+    earlier, far, stiffness, damping
+):
+    """The instants differ by round-off of the stop's force: it still slides with 5 m/s."""
+    structure = mp.LinearStructure(np.eye(3), np.zeros((3, 3)), None, {"slider": 0, "y": 1, "x": 2})
+    floor = mp.UnilateralContact("floor", "y", -far, stiffness, damping, friction=0.25, tangential="x")
+    model = mp.MultiPhiModel(structure, [floor, mp.Friction("guide", "slider", 1.0)], modes="all")
+    place, velocity = np.array([0.0, far, 0.0]), np.array([0.0, -0.01, 5.0])
+    alone = mp.simulate(model, 10.0, place, velocity)
+    opens = next(event.time for event in alone.events if event.contact == "floor" and event.kind == "open")
+    velocity[0] = opens - earlier
+    run = mp.simulate(model, 2 * opens, place, velocity)
+    assert_lawful(run, start=(place, velocity), round_off=1e-11)
+    assert run.velocity(2 * opens)[2] == pytest.approx(float(alone.velocity(2 * opens)[2]), rel=1e-9)

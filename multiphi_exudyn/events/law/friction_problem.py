@@ -80,14 +80,16 @@ def pose_rows(ints: Ints, count: int, r: int, n: int) -> None:
 def list_at_rest(ints: Ints, numbers: Numbers, requests: int) -> int:
     """List the rigid friction elements that stick, request a change or have no slip velocity, and their links.
 
-    Return their number, or zero if none of them requests a change.
+    A slipping contact that requests to open has a slip velocity: it is at rest only if that is round-off. Return their
+    number, or zero if none of them requests a change.
     """
     states, count, request_count = ints[ints[WORKED + LEVEL] + STATES], 0, 0
     for i in range(ints[ELEMENTS]):
         requested = ints[requests + i]
         if numbers[ints[LIMITS] + i] > 0.0 and pressure(ints, numbers, i) > 0.0:
             signal = first_exit(ints, ints[WORKED + LEVEL], i) + SIGNAL
-            rests = ints[states + i] == ints[ints[STICKS] + i] or requested != NO_REQUEST
+            sticks = ints[ints[STICKS] + i]
+            rests = ints[states + i] == sticks or (requested != NO_REQUEST and requested >= sticks)
             if rests or row_sign(ints, numbers, WORKED, signal, 0.0) == 0:
                 ints[ints[RESTING_LIST] + count] = i
                 ints[ints[TOUCHING] + count] = ints[ints[HELD_LINKS] + i]
