@@ -1,6 +1,9 @@
-"""Static response along one direction: the quotient is what a dense solution of all coordinates gives."""
+"""Static response: along one direction the quotient is what a dense solution of all coordinates gives, along several
+the solution in exact numbers, however soft a mode is.
+"""
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -73,3 +76,38 @@ def test_levels_with_one_closed_contact_rest_there():
     wanted, configuration = solved(base, 30.0, 0.02, load)
     assert force == pytest.approx(wanted, rel=1e-11)
     assert_allclose(y, configuration, rtol=0, atol=1e-12 * np.max(np.abs(configuration)))
+
+
+def exact(base, load):
+    """y (m,) of ``solved`` with all contacts of a base, in rational numbers."""
+    m, size = len(load), len(load) + len(base.stiffnesses)
+    rows = [[Fraction(0)] * (size + 1) for _ in range(size)]
+    for i, square in enumerate(base.squares.tolist()):
+        rows[i][i], rows[i][size] = Fraction(square), Fraction(float(load[i]))
+        for j, part in enumerate(base.directions[i].tolist()):
+            rows[i][m + j], rows[m + j][i] = -Fraction(part), Fraction(part)
+    for j, (stiffness, gap) in enumerate(zip(base.stiffnesses.tolist(), base.gaps.tolist(), strict=True), m):
+        rows[j][j], rows[j][size] = 0 if math.isinf(stiffness) else 1 / Fraction(stiffness), -Fraction(gap)
+    for i in range(size):
+        largest = max(range(i, size), key=lambda row: abs(rows[row][i]))
+        rows[i], rows[largest] = rows[largest], rows[i]
+        for k in range(size):
+            factor = rows[k][i] / rows[i][i] if k != i else Fraction(0)
+            rows[k] = [mine - factor * other for mine, other in zip(rows[k], rows[i], strict=True)]
+    return np.array([float(rows[i][size] / rows[i][i]) for i in range(m)])
+
+
+@pytest.mark.parametrize("ground", [1e-11, 1e-10, 1e-9, 1e-6, 1.0])
+def test_contacts_hold_a_structure_on_a_soft_spring_as_exactly_as_on_a_stiff_one(ground):
+    """Beside a flexibility of 1e9 m/N that of the other modes has few digits."""
+    rng = np.random.default_rng(4)
+    free = chain(4, ends=0, stiffness=10.0)
+    stiffness = free.stiffness + np.diag([ground, 0.0, 0.0, 0.0])
+    stops = [mp.UnilateralContact(f"stop{k}", rng.normal(size=4), 0.05, (math.inf, 200.0, 11.0)[k]) for k in range(3)]
+    structure = mp.LinearStructure(free.mass, stiffness, points={"m0": 0})
+    model = mp.MultiPhiModel(structure, stops, modes="all")
+    assert model.base.modes.rigid == 0
+    load = model.base.modes.shapes.T @ np.array([1.3, 0.0, 0.0, -1.3])
+    _, y = static_response(model.base, model.base.closed_at((0, 1, 2)), load)
+    wanted = exact(model.base, load)
+    assert_allclose(y, wanted, rtol=0, atol=1e-12 * np.max(np.abs(wanted)))

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from small_structures import chain, random_model, stop
 
-from multiphi_exudyn import MultiPhiModel, cli, simulate
+from multiphi_exudyn import MultiPhiModel, UnilateralContact, cli, simulate
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.study.stability import catalogue_run, native_run
 from multiphi_exudyn.study.stability.case import Case, Problem
@@ -19,6 +19,7 @@ from multiphi_exudyn.study.stability.judgement import judge
 from multiphi_exudyn.study.stability.native_run import run_native
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
 from multiphi_exudyn.study.stability.report import render_stability, text_table
+from multiphi_exudyn.study.stability.run_laws import energy_rise
 from multiphi_exudyn.study.stability.summary import contents, failures, summaries
 from multiphi_exudyn.time.segments.segment import SegmentList
 from reference_models.full_matrices import run_matrices
@@ -137,6 +138,15 @@ def test_a_user_object_is_right_or_wrong_or_too_coarse(honest):
 def test_what_a_damped_stop_gives_back_as_it_closes_again_is_no_error_of_the_energy(name):
     case = BY_NAME[name]
     assert run_native(case, case.build(True), 20.0, BUDGET).outcome.energy < 1e-12
+
+
+def test_what_a_damped_stop_takes_as_it_opens_is_no_rise_of_the_energy():
+    """The spring of a viscous contact is still pressed where its force is zero; its energy is lost there."""
+    contact = UnilateralContact("stop", {"m0": 1.0}, 0.1, 400.0, damping=9.0)
+    run = simulate(MultiPhiModel(chain(1), [contact], modes="all"), 0.2, displacement=[-0.11], velocity=[0.2])
+    assert [event.kind for event in run.events] == ["open"]
+    assert run.events[0].loss.damping > 1e-6
+    assert energy_rise(run, run.segments) < 1e-12
 
 
 class TestTheJudgeKnowsFriction:

@@ -127,6 +127,11 @@ class LoadedLevels:
         self.model.level_at(entry.links)  # marks it as used last among those that the model keeps
         return entry.level
 
+    def kept(self, states: tuple[int, ...]) -> LoadedLevel | None:
+        """Return the level of elements in these states if it is among those that are kept."""
+        entry = self._entries.find(states)
+        return None if entry is None else entry.level
+
     def further(self, states: tuple[int, ...], key: Hashable, make: Callable[[], T]) -> T:
         """Return a value derived from a level, by a key of all it depends on; made once, kept with the level."""
         value: T = self._entry(states).further.get_or_build(key, make)

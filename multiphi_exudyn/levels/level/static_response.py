@@ -20,11 +20,12 @@ from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.base.modal_base import GAPS, SPRINGS, SQUARES, ModalBase
 from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.orthonormal import absolute_product, scalar_product
-from multiphi_exudyn.mathematics.round_off import FOLLOWING, INDEPENDENT, ZERO, drop_round_off
+from multiphi_exudyn.mathematics.round_off import FOLLOWING, INDEPENDENT, PRODUCT, ZERO, drop_round_off
 
 __all__ = ["Asymptotic", "gaps_and_strain", "response_of_neutral_level", "static_response"]
 
 NONE = np.zeros((0, 0))  # rigid-body motions of a structure that has none
+CORRECTIONS = 8  # at most; each takes an error to its product with round-off times the flexibility of the softest mode
 
 
 @dataclass(frozen=True)
@@ -173,9 +174,17 @@ def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.nda
         elastic_load + elastic_vectors @ forces, np.abs(elastic_load) + np.abs(elastic_vectors) @ np.abs(forces)
     )
     configuration = _with_rigid_motion(resisted, rigid_motion, compliance * total)
-    violation = offsets + spring_compliance * forces + sprung * (configuration @ vectors)
-    correction, rigid_motion = solve(-violation, np.zeros(len(rigid_motion)))  # round-off magnified by soft modes
-    return forces + correction, configuration + _with_rigid_motion(resisted, rigid_motion, deflections @ correction)
+    for passed in range(CORRECTIONS):  # of round-off, which soft modes magnify
+        violation = offsets + spring_compliance * forces + sprung * (configuration @ vectors)
+        terms = (
+            np.abs(offsets) + np.abs(spring_compliance * forces) + sprung * (np.abs(configuration) @ np.abs(vectors))
+        )
+        if passed and np.all(np.abs(violation) <= PRODUCT * terms):
+            break
+        correction, rigid_motion = solve(-violation, np.zeros(len(rigid_motion)))
+        forces = forces + correction
+        configuration = configuration + _with_rigid_motion(resisted, rigid_motion, deflections @ correction)
+    return forces, configuration
 
 
 def _resisted_motions(base: ModalBase, closed_directions: ClosedDirections) -> np.ndarray:

@@ -210,7 +210,7 @@ def energy_rise(run: Trajectory, segments: Sequence[Segment], samples: int = 5) 
     times = np.array([start + inside * (end - start) for start, end in ends])
     left = (run.energy(times.ravel()) - _work(run, times.ravel())).reshape(times.shape)
     rises = np.diff(left.ravel()) if _complete(run) else np.diff(left, axis=1).ravel()
-    returned = max((-event.loss.damping for event in run.events), default=0.0)  # by dampers
+    returned = max([0.0, *(-event.loss.damping for event in run.events)])  # by dampers, which mostly take
     return max(0.0, float(np.max(rises, initial=0.0)) - returned)
 
 

@@ -25,7 +25,8 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "linear range: ..."       result of the model's own validity check
     "cluster: ..."            levels that keep more modes than asked for, so that no modes of one frequency are parted
     "base: ..."               motion or loads outside the base of a large structure (base_warnings.py)
-    "slow mode: ..."          a mode whose period is so long that its motion under loads is lost in round-off
+    "slow mode: ..."          a mode that rests so far away that its motion is lost in round-off (far_rest.py), or so
+                              slow that its motion under varying loads is
     "load pieces: ..."        loads of so many samples or pieces that the run takes long
     "coarse steps: ..."       steps of Exudyn that delay the motion of modes not matched to them
     "truncated statics: ..."  what the modes leave out of a static solution of Exudyn under forces on a body's interface
@@ -50,6 +51,7 @@ from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.model.mode_choice import Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.time.loop.verdict import lost_share
+from multiphi_exudyn.time.reliability.far_rest import FarRest
 from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
 from multiphi_exudyn.time.reliability.impact_warnings import impact_warnings, is_taking, mesh_warnings, spread_contacts
 from multiphi_exudyn.time.reliability.law_span import LawPlaces, laws_at_an_end, span_warnings
@@ -69,33 +71,37 @@ from multiphi_exudyn.time.warnings.model_warnings import (
 
 __all__ = ["ModelWarnings", "RunSummary", "warnings_of", "warnings_of_body"]
 
-SLOW = 1e-5  # rad: phase of a mode at the end of a run; below it, a millionth of the response to loads is round-off
-ONLY_ROUND_OFF = 2e-8  # rad: phase at which all is round-off, whose share falls with the square of the phase
+SLOW = 1e-8  # rad: phase of a mode at the end of a run; below it, 2e-8 of the response to varying loads is round-off
 HARDLY = 0.01  # of a period of the fastest kept mode: so short a run is hardly intended
 MANY_PIECES = 2**19  # of loads in a run: some seconds of computing and 250 MB
 PIECE_SECONDS = 1e-5  # that a piece of a load takes in a small model
 PIECE_BYTES = 500  # that it takes there, its segment included
+EPSILON = float(np.finfo(float).eps)
 
 
 def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[str, ...]:
     """Warnings of a run, one sentence each; tolerance: the one that decided its modes.
 
-    All warnings but those of the ledger and of truncation are the same for runs of one length in the same levels, and
-    are cached for them, unless friction, a force law that is approximated or at an end of its span, or the model's own
-    check needs the motion of every run.
+    All warnings but those of the ledger, of a far rest and of truncation are the same for runs of one length in the
+    same levels, and are cached for them, unless friction, a force law that is approximated or at an end of its span, or
+    the model's own check needs the motion of every run.
     """
     record, model = trajectory.ending.record, trajectory.model
     visited, cache = record.visited, record.arrays.levels.told
     if not visited:
         return ()
-    key = visited, trajectory.t_end, trajectory.start.time
+    begun = trajectory.start.states
+    key = visited, begun, trajectory.t_end, trajectory.start.time
     entry = cache.find(key)
     if entry is None:
         general = ModelWarnings.of(model, trajectory.segments)
-        entry = general, *general.for_run(trajectory)
+        first = record.arrays.levels.kept(begun)  # a run may leave it at once, so that it has no segment there
+        passed = [*trajectory.segments.levels, *([] if begun in visited or first is None else [first])]
+        entry = general, FarRest.of(passed), *general.for_run(trajectory)
         if not general.needs_motion:
             cache.keep(key, entry)
-    general, before, after = entry
+    general, rest, before, after = entry
+    after = (*after, *rest.warnings(trajectory))
     if trajectory.ending.numbers[BALANCED] != 1.0 or record.left_out_count:
         before = (*ledger_warnings(trajectory), *before)
     if general.spread and is_taking(trajectory.ending.numbers):
@@ -116,7 +122,7 @@ class ModelWarnings:
     rigid: whether there is a rigid contact. spread: names of those whose effective mass the mesh decides. needs_motion:
     whether friction, a force law that is approximated or at an end of its span, or the model's own check, needs the
     motion of every run. before, clusters: warnings. fastest: highest frequency of the open level [Hz]. slowest: lowest
-    nonzero frequency of the levels [rad/s]. ample: a duration [s] in which all modes move.
+    nonzero frequency of the levels [rad/s].
     """
 
     rigid: bool
@@ -126,7 +132,6 @@ class ModelWarnings:
     clusters: tuple[str, ...]
     fastest: float
     slowest: float
-    ample: float
 
     @classmethod
     def of(cls, model: MultiPhiModel, segments: Segments) -> ModelWarnings:
@@ -140,8 +145,6 @@ class ModelWarnings:
         levels = [level.modal for level in loaded]
         static = () if model.whole else static_warnings(levels)
         omega = np.concatenate([level.omega for level in levels])
-        fastest = model.level_at(()).highest_frequency
-        slowest = float(np.min(omega[omega > 0], initial=math.inf))
         return cls(
             any(contact.rigid for contact in model.contacts),
             spread_contacts(model),
@@ -150,9 +153,8 @@ class ModelWarnings:
             or bool(approximated_laws(model) or laws_at_an_end(model, [v.states for v in loaded])),
             (*digit_warnings(model), *damping_warnings(model), *missing_modes(model), *static),
             tuple(cluster_warnings(levels)),
-            fastest,
-            slowest,
-            max(HARDLY / fastest if fastest > 0 else 0.0, SLOW / slowest),
+            model.level_at(()).highest_frequency,
+            float(np.min(omega[omega > 0], initial=math.inf)),
         )
 
     def for_run(self, trajectory: Trajectory) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -161,24 +163,22 @@ class ModelWarnings:
         The same for all runs in the same levels, unless ``needs_motion``.
         """
         before, after, excitation = self.before, self.clusters, trajectory.segments.levels[0].excitation
-        brief = trajectory.t_end - trajectory.start.time < self.ample
-        if brief:
-            before = (*_slow(trajectory, self.fastest), *before)
-        if brief or self.needs_motion:
+        before = (*_slow(trajectory, self.fastest), *before)
+        if self.needs_motion:
             after = (*after, *self._of_motion(trajectory))
+        if excitation.histories:
+            after = (*after, *_slow_mode(trajectory, self.slowest))
         if excitation.histories and excitation.most_effort > MANY_PIECES < excitation.effort(trajectory.t_end):
             after = (*after, _load_pieces(excitation, trajectory.t_end))
         return before, after
 
     def _of_motion(self, trajectory: Trajectory) -> Iterator[str]:
-        """Warnings of the model's own check, of slow modes, of force laws, and of friction in a run."""
+        """Warnings of the model's own check, of force laws, and of friction in a run."""
         model = trajectory.model
         if model.validity is not None:
             yield from model.validity(trajectory)
-        yield from _slow_mode(trajectory, self.slowest)
-        if self.needs_motion:
-            yield from law_warnings(trajectory)
-            yield from span_warnings(trajectory)
+        yield from law_warnings(trajectory)
+        yield from span_warnings(trajectory)
         if model.general:
             yield from friction_warnings(trajectory.segments, model)
             yield from impact_warnings(trajectory)
@@ -224,16 +224,13 @@ def _struck(trajectory: Trajectory) -> bool:
 
 
 def _slow_mode(trajectory: Trajectory, slowest: float) -> Iterator[str]:
-    """Warning of a mode with so small a phase at the end of a run that its response is a difference of large terms.
-
-    p (1 - cos omega t) / omega^2 is p t^2 / 2, and its terms are 2 / (omega t)^2 of that.
-    """
-    span, levels = trajectory.t_end - trajectory.start.time, trajectory.segments.levels
-    if 0 < slowest * span < SLOW and not all(level.excitation.nothing for level in levels):
-        share = min(1.0, ONLY_ROUND_OFF / (slowest * span)) ** 2
+    """Warning of a mode with so small a phase at the end of a run that sin(omega t) / omega has few digits."""
+    span = trajectory.t_end - trajectory.start.time
+    if 0 < slowest * span < SLOW:
         yield (
             f"slow mode: a mode of {slowest / (2 * math.pi):.3g} Hz has hardly begun in {span:g} s, so "
-            f"{per_cent(share)} of what loads move it by is round-off; hold it, or make its stiffness exactly zero"
+            f"{per_cent(min(1.0, EPSILON / (slowest * span)))} of what varying loads move it by is round-off; hold it, "
+            "or make its stiffness exactly zero"
         )
 
 

@@ -96,7 +96,9 @@ def _digits(random):
     printed = np.array([[float(f"{value:.{digits - 1}e}") for value in row] for row in stiffness])
     structure = mp.LinearStructure(parts.mass, printed, None, {f"m{i}": i for i in range(n)})
     scene = parts.scene(velocity=random_velocity(parts), structure=structure)
-    return replace(scene, near=max(scene.near, ROUNDED * 10.0**-digits))
+    unit = 10.0 ** (np.floor(np.log10(np.max(stiffness))) - (digits - 1))
+    held = 0.25 * n * unit * scene.t_end**2 / np.trace(parts.mass)  # by half a unit in every row, of the way
+    return replace(scene, near=max(scene.near, ROUNDED * 10.0**-digits, float(held)))
 
 
 DRAWN = {

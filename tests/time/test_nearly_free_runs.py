@@ -1,0 +1,105 @@
+"""Runs of structures that a far softer spring holds than bend them."""
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import multiphi_exudyn as mp
+
+
+def chain(ground):
+    """Three masses in a row, and a spring to the ground."""
+    stiffness = np.array([[5.5, -5.5, 0.0], [-5.5, 23.5, -18.0], [0.0, -18.0, 18.0]])
+    stiffness[0, 0] += ground
+    return mp.LinearStructure(np.diag([0.7, 0.9, 2.0]), stiffness, points={"left": 0, "middle": 1, "right": 2})
+
+
+@pytest.mark.parametrize("ground", [1e-10, 1e-9, 1e-8])
+def test_friction_beside_rigid_stops_sticks_as_on_a_free_structure(ground):
+    """The force of its spring is at the limit as it sticks: a rest of it would make it slip on, against its slip."""
+    contacts = [
+        mp.UnilateralContact("below", {"right": -1.0}, 0.0),
+        mp.UnilateralContact("across", {"left": 0.9, "middle": 1.0, "right": 0.2}, 0.0),
+        mp.Friction("rubs", {"left": 1.0, "right": -1.0}, 1.3, stiffness=11.0),
+    ]
+
+    def run(ground):
+        model = mp.MultiPhiModel(chain(ground), contacts, modes="all")
+        return mp.simulate(model, 1.0, displacement=np.zeros(3), velocity=[-1.6, 0.1, 0.7])
+
+    held, free = run(ground), run(0.0)
+    assert [event.kind for event in held.events][:4] == ["close", "close", "slip", "stick"]
+    assert [(event.kind, event.contact) for event in held.events] == [(e.kind, e.contact) for e in free.events]
+    times = np.linspace(0.0, 1.0, 50)
+    assert_allclose(held.displacement(times), free.displacement(times), rtol=0, atol=1e-7)
+
+
+def slow_modes(run):
+    return [text for text in run.warnings if text.startswith("slow mode: ")]
+
+
+def pressed(ground):
+    """The chain that a constant force presses on a stop, on which it bounces."""
+    stop = mp.UnilateralContact("stop", {"left": 1.0}, 0.1, 400.0)
+    model = mp.MultiPhiModel(chain(ground), [stop], modes="all")
+    loads = [mp.ConstantLoad({"left": 1.0, "middle": 1.0, "right": 1.0}, -3.0)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", mp.MultiPhiWarning)
+        return mp.simulate(model, 8.0, displacement=[0.02, 0.0, -0.01], velocity=[0.3, -0.2, 0.1], loads=loads)
+
+
+@pytest.mark.parametrize(("ground", "told"), [(1e-11, True), (1e-9, True), (1e-6, False), (1e-4, False), (0.0, False)])
+def test_digits_that_a_far_rest_takes_are_told_before_they_spoil_the_motion(ground, told):
+    """It rests 9 N / 1e-11 N/m away from the stop, and moves by a metre."""
+    run, free = pressed(ground), pressed(0.0)
+    assert len(run.events) > 6
+    sentences = slow_modes(run)
+    assert len(sentences) == told
+    early = np.linspace(0.0, 2.0, 50)
+    off = np.max(np.abs(run.displacement(early) - free.displacement(early)))
+    assert off < 1e-6 + ground or told
+    if told:
+        assert f"{len(run.events)} events" in sentences[0]
+        assert sentences[0].endswith("; hold it, or make its stiffness exactly zero")
+
+
+def test_a_rest_far_from_where_a_run_begins_is_told_though_it_leaves_that_level_at_once():
+    """The stop closes at the start, and the body stays on it."""
+    body = mp.LinearStructure([[0.7]], [[2.4e-10]], points={"m": 0})
+    stop = mp.UnilateralContact("stop", {"m": -1.0}, 0.0, 115.0, damping=9.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", mp.MultiPhiWarning)
+        run = mp.simulate(mp.MultiPhiModel(body, [stop]), 8.0, velocity=[0.27], loads=[mp.ConstantLoad("m", 0.7)])
+    assert [event.kind for event in run.events] == ["close"]
+    assert len(run.segments) == 1
+    assert len(slow_modes(run)) == 1
+
+
+@pytest.mark.parametrize("frequency", [0.01, 0.1, 0.5])
+@pytest.mark.parametrize("end", [1e-3, 0.1, 1.0])
+@pytest.mark.filterwarnings("ignore:slow model:multiphi_exudyn.MultiPhiWarning")
+def test_suspensions_are_not_told(frequency, end):
+    """A body on its suspension, struck: it rests 2.5 km away for 0.01 Hz, and its motion is right."""
+    body = mp.LinearStructure(np.eye(1), [[(2 * math.pi * frequency) ** 2]], points={"m": 0})
+    stop = mp.UnilateralContact("stop", {"m": 1.0}, 1e-5, 1e8)
+    model = mp.MultiPhiModel(body, [stop], modes="all")
+    run = mp.simulate(model, end, velocity=[-0.1], loads=[mp.ConstantLoad("m", -9.81)])
+    assert slow_modes(run) == []
+
+
+@pytest.mark.filterwarnings("ignore:slow mode:multiphi_exudyn.MultiPhiWarning")
+def test_a_varying_load_on_a_mode_that_hardly_begins_is_told():
+    """sin(omega t) / omega has all digits but for the last rad of 1e-8."""
+
+    def run(stiffness):
+        body = mp.LinearStructure([[2.0]], [[stiffness]], points={"m": 0})
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", mp.MultiPhiWarning)
+            return mp.simulate(mp.MultiPhiModel(body), 2.0, loads=[mp.HarmonicLoad("m", 3.0, 0.5)])
+
+    assert " 100 % of what varying loads move it by" in slow_modes(run(1e-32))[0]
+    assert slow_modes(run(1e-14)) == []
+    assert run(1e-14).at("m", 2.0) == pytest.approx(run(0.0).at("m", 2.0), rel=5e-8)
