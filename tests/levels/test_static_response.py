@@ -1,4 +1,7 @@
-"""Static response along one direction: the quotient is what a dense solution of all coordinates gives."""
+"""Static response: along one direction a quotient, which is what a dense solution of all coordinates gives.
+
+Beside others also where a direction hardly bends the structure, but moves it as a rigid body.
+"""
 
 import math
 
@@ -73,3 +76,23 @@ def test_levels_with_one_closed_contact_rest_there():
     wanted, configuration = solved(base, 30.0, 0.02, load)
     assert force == pytest.approx(wanted, rel=1e-11)
     assert_allclose(y, configuration, rtol=0, atol=1e-12 * np.max(np.abs(configuration)))
+
+
+@pytest.mark.parametrize("unit", [1.0, 2.0**40, 2.0**-40])
+@pytest.mark.parametrize("first", [math.inf, 3.0])
+@pytest.mark.parametrize("bend", [0.0, 1e-16, 1e-15, 1e-14, 1e-12, 1e-9, 1e-6, 1e-3, 1.0])
+def test_a_rigid_stop_that_hardly_bends_the_structure_bears_what_equilibrium_asks(bend, first, unit):
+    """Of two joined masses x, z and a free one y: k (x + z) = 2 f + h g = bend g, and y has the forces 1 and l g."""
+    random = np.random.default_rng(4)
+    for _ in range(20):
+        k, h, length, *gaps = random.uniform(0.3, 2.0, 5)
+        stiffness = unit * 10 * k * np.array([[1.0, 0.0, 1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 1.0]])
+        structure = mp.LinearStructure(np.diag(random.uniform(1.0, 5.0, 3)), stiffness, points={"x": 0, "y": 1, "z": 2})
+        stops = (
+            mp.UnilateralContact("f", {"x": 2.0}, 0.0, unit * first),
+            mp.UnilateralContact("g", [h, length, bend], 0.0),
+        )
+        level = mp.MultiPhiModel(structure, stops, modes="all").level(("f", "g"))
+        forces = level.static_response(level.base.modal_load(unit * structure.row("y")), np.array(gaps))[0]
+        g = -1 / length
+        assert_allclose(forces / unit, [(bend - h) / 2 * g, g], rtol=0, atol=1e-12)
