@@ -173,19 +173,24 @@ def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.nda
     )
     deflections, coupling = (compliance * elastic_vectors.T).T, vectors[:rigid].T @ resisted
     flexibility, push = elastic_vectors.T @ deflections, load[:rigid] @ resisted
-    sizes = _sizes(base, closed_directions, flexibility.diagonal() + sprung * np.abs(spring_compliance), coupling)
-    solve = _solver(flexibility, spring_compliance, sprung, coupling, sizes)
+    unknowns = _sizes(base, closed_directions, flexibility.diagonal() + sprung * np.abs(spring_compliance), coupling)
+    solve = _solver(flexibility, spring_compliance, sprung, coupling, unknowns)
     forces, rigid_motion = solve(-offsets - sprung * (elastic_load @ deflections), -push)
-    total = drop_round_off(
-        elastic_load + elastic_vectors @ forces, np.abs(elastic_load) + np.abs(elastic_vectors) @ np.abs(forces)
-    )
+    terms = np.abs(elastic_load) + np.abs(elastic_vectors) @ np.abs(forces)
+    total = drop_round_off(elastic_load + elastic_vectors @ forces, terms)
     configuration = _with_rigid_motion(resisted, rigid_motion, compliance * total)
     violation = offsets + spring_compliance * forces + sprung * (configuration @ vectors)
     imbalance = drop_round_off(
         push + forces @ coupling, np.abs(load[:rigid]) @ np.abs(resisted) + np.abs(forces) @ np.abs(coupling)
     )
     correction, rigid_motion = solve(-violation, -imbalance)
-    return forces + correction, configuration + _with_rigid_motion(resisted, rigid_motion, deflections @ correction)
+    moved = _with_rigid_motion(resisted, rigid_motion, deflections @ correction)
+    sizes = np.abs(configuration) + np.abs(moved)
+    sizes[rigid:] += compliance * terms
+    return (
+        drop_round_off(forces + correction, np.abs(forces) + np.abs(correction)),
+        drop_round_off(configuration + moved, sizes),
+    )
 
 
 def _resisted_motions(base: ModalBase, closed_directions: ClosedDirections) -> np.ndarray:
