@@ -96,3 +96,14 @@ def test_a_rigid_stop_that_hardly_bends_the_structure_bears_what_equilibrium_ask
         forces = level.static_response(level.base.modal_load(unit * structure.row("y")), np.array(gaps))[0]
         g = -1 / length
         assert_allclose(forces / unit, [(bend - h) / 2 * g, g], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("stiffness", [1000.0, 37.0, 3e6])
+def test_a_stop_beside_another_that_bears_the_load_itself_has_no_force_at_all(stiffness):
+    """x is free, y on a spring is held where the load acts: round-off would tell a soft stop at x - y to open."""
+    structure = mp.LinearStructure(np.eye(2), np.diag([0.0, 5.0]), points={"x": 0, "y": 1})
+    stops = mp.UnilateralContact("soft", {"x": 1.0, "y": -1.0}, 0.0, stiffness), mp.UnilateralContact("held", "y", 0.0)
+    level = mp.MultiPhiModel(structure, stops, modes="all").level(("soft", "held"))
+    forces, y = level.static_response(level.base.modal_load(structure.row("y")), np.zeros(2))
+    assert forces.tolist() == [0.0, -1.0]
+    assert y.tolist() == [0.0, 0.0]
