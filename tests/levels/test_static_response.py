@@ -1,5 +1,7 @@
 """Static response: along one direction the quotient is what a dense solution of all coordinates gives, along several
 the solution in exact numbers, however soft a mode is.
+
+Beside others also where a direction hardly bends the structure, but moves it as a rigid body.
 """
 
 import math
@@ -111,3 +113,35 @@ def test_contacts_hold_a_structure_on_a_soft_spring_as_exactly_as_on_a_stiff_one
     _, y = static_response(model.base, model.base.closed_at((0, 1, 2)), load)
     wanted = exact(model.base, load)
     assert_allclose(y, wanted, rtol=0, atol=1e-12 * np.max(np.abs(wanted)))
+
+
+@pytest.mark.parametrize("unit", [1.0, 2.0**40, 2.0**-40])
+@pytest.mark.parametrize("first", [math.inf, 3.0])
+@pytest.mark.parametrize("bend", [0.0, 1e-16, 1e-15, 1e-14, 1e-12, 1e-9, 1e-6, 1e-3, 1.0])
+def test_a_rigid_stop_that_hardly_bends_the_structure_bears_what_equilibrium_asks(bend, first, unit):
+    """Of two joined masses x, z and a free one y: k (x + z) = 2 f + h g = bend g, and y has the forces 1 and l g."""
+    random = np.random.default_rng(4)
+    for _ in range(20):
+        k, h, length, *gaps = random.uniform(0.3, 2.0, 5)
+        stiffness = unit * 10 * k * np.array([[1.0, 0.0, 1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 1.0]])
+        structure = mp.LinearStructure(np.diag(random.uniform(1.0, 5.0, 3)), stiffness, points={"x": 0, "y": 1, "z": 2})
+        stops = (
+            mp.UnilateralContact("f", {"x": 2.0}, 0.0, unit * first),
+            mp.UnilateralContact("g", [h, length, bend], 0.0),
+        )
+        level = mp.MultiPhiModel(structure, stops, modes="all").level(("f", "g"))
+        forces = level.static_response(level.base.modal_load(unit * structure.row("y")), np.array(gaps))[0]
+        g = -1 / length
+        assert_allclose(forces / unit, [(bend - h) / 2 * g, g], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("stiffness", [1000.0, 37.0, 3e6])
+def test_a_stop_beside_another_that_bears_the_load_itself_has_no_force_at_all(stiffness):
+    """x is free, y on a spring is held where the load acts: round-off would tell a soft stop at x - y to open."""
+    structure = mp.LinearStructure(np.eye(2), np.diag([0.0, 5.0]), points={"x": 0, "y": 1})
+    stops = mp.UnilateralContact("soft", {"x": 1.0, "y": -1.0}, 0.0, stiffness), mp.UnilateralContact("held", "y", 0.0)
+    level = mp.MultiPhiModel(structure, stops, modes="all").level(("soft", "held"))
+    forces, y = level.static_response(level.base.modal_load(structure.row("y")), np.zeros(2))
+    assert forces[0] == 0.0
+    assert forces[1] == pytest.approx(-1.0, rel=1e-14)
+    assert y.tolist() == [0.0, 0.0]

@@ -91,3 +91,50 @@ def test_forces_that_cancel_elsewhere_are_right_while_it_slides(start):
     run = mp.simulate(mp.MultiPhiModel(structure, [floor, law, spring], modes="all"), 2.0, velocity=velocity)
     assert run.status == "ok"
     assert not broken_laws(run, [], (np.zeros(3), velocity))
+
+
+def belts(factor):
+    """Dry friction holds x and, on a belt, x + y; a damped stop rubs on z."""
+    stop = mp.UnilateralContact(
+        "c", {"x": 1.0, "y": 1.0}, 0.5, 1.0, 100.0, 0.25, {"z": -1.0}, 0.5, tangential_velocity=1.0
+    )
+    belt = mp.Friction("belt", {"x": 1.0, "y": 1.0}, 10.0, velocity=-factor)
+    return 2.5, [stop, mp.Friction("block", {"x": 2.0}, 10.0), belt], [], ([0.0, 0.5, -1.0], [1.0, 1.0, 2.0])
+
+
+def facing(factor):
+    """A rigid stop of z and a soft one that faces it and moves, whose friction holds y - z."""
+    soft = mp.UnilateralContact("soft", {"z": -1.0}, 0.0, 10.0, 0.0, 0.25, {"y": 1.0, "z": -1.0}, 0.5)
+    moving = mp.StopMotion("soft", mp.Harmonic(factor, 0.5 / np.pi, -np.pi / 2))
+    return 2.0, [mp.UnilateralContact("rigid", "z", 0.5), soft], [moving], (np.zeros(3), [-2.0, 0.0, 0.0])
+
+
+def rough_floor(factor):
+    """A rough rigid stop of z holds y + z, beside a force law of y and a soft stop of x on a belt along y."""
+    rigid = mp.UnilateralContact("rigid", {"z": 2.0}, 1.0, friction=1.0, tangential={"y": -1.0, "z": -1.0})
+    soft = mp.UnilateralContact("soft", "x", 1.0, 1.0, 0.0, 0.5, {"y": 2.0}, tangential_velocity=1.0)
+    law = mp.ForceLaw({"y": -1.0}, (np.array([-2.0, -1.0, 0.0, 1.0, 2.0]), np.array([-40.0, 10.0, 0.0, -10.0, 40.0])))
+    return 2.0, [rigid, soft, law], [mp.ConstantLoad("z", -24.0 * factor)], ([-1.0, 0.0, 0.0], [-2.0, 1.0, 0.0])
+
+
+def between_walls(factor):
+    """Two rigid walls of x, one of them rough along x + y, and a damped floor of y."""
+    rough = mp.UnilateralContact("rough", {"x": -2.0}, 1.0, friction=0.5, tangential={"x": 1.0, "y": 1.0})
+    floor = mp.UnilateralContact("floor", "y", 0.0, 10.0, 10.0)
+    load = mp.ConstantLoad("y", -factor)
+    walls = [rough, mp.UnilateralContact("other", {"x": 2.0}, 0.0)]
+    return 1.0, [*walls, floor], [load], ([0.5, 1.0, 1.0], [-2.0, 1.0, -1.0])
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.93, 1.12])
+@pytest.mark.parametrize("scene", [belts, facing, rough_floor, between_walls])
+def test_where_nothing_else_holds_a_coordinate_friction_bears_what_equilibrium_asks(scene, factor):
+    """x + z = 0 holds two masses together, and y none: to hold y does not bend the structure."""
+    k, elements, loads, start = scene(factor)
+    stiffness = k * factor * np.array([[1.0, 0.0, 1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 1.0]])
+    structure = mp.LinearStructure(np.eye(3), stiffness, points={"x": 0, "y": 1, "z": 2})
+    start = tuple(np.array(part) for part in start)
+    run = mp.simulate(mp.MultiPhiModel(structure, elements, modes="all"), 5.0, *start, loads)
+    assert run.status == "ok"
+    assert not broken_laws(run, loads, start)
+    assert any(event.kind in ("stick", "slip") for event in run.events)

@@ -24,6 +24,7 @@ from multiphi_exudyn.mathematics.round_off import FOLLOWING, INDEPENDENT, PRODUC
 
 __all__ = ["Asymptotic", "gaps_and_strain", "response_of_neutral_level", "static_response"]
 
+HARDLY_BENDS = 1e-8  # of the length of a direction, the root of round-off: a correction cannot undo a smaller scale
 NONE = np.zeros((0, 0))  # rigid-body motions of a structure that has none
 CORRECTIONS = 8  # at most; each takes an error to its product with round-off times the flexibility of the softest mode
 
@@ -159,7 +160,12 @@ def response_of_neutral_level(
 
 
 def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """``static_response`` where the directions of rigid contacts are orthogonal."""
+    """``static_response`` where the directions of rigid contacts are orthogonal.
+
+    The solution is corrected until it holds: round-off of y is magnified by soft modes, that of f by a direction that
+    hardly bends (``_sizes``). What a correction takes back is round-off and becomes zero; should that be a displacement
+    of a soft mode, the next correction gives it again.
+    """
     rigid, compliance, offsets = base.modes.rigid, base.compliance, closed_directions.offsets
     vectors, elastic_vectors, elastic_load = closed_directions.vectors, closed_directions.vectors[rigid:], load[rigid:]
     sprung = closed_directions.stiffness != 0  # the others have the constant force G
@@ -167,23 +173,31 @@ def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.nda
         1 / np.where(sprung, closed_directions.stiffness, 1.0),
         _resisted_motions(base, closed_directions),
     )
-    deflections = (compliance * elastic_vectors.T).T
-    solve = _solver(elastic_vectors.T @ deflections, spring_compliance, sprung, vectors[:rigid].T @ resisted)
-    forces, rigid_motion = solve(-offsets - sprung * (elastic_load @ deflections), -(load[:rigid] @ resisted))
-    total = drop_round_off(
-        elastic_load + elastic_vectors @ forces, np.abs(elastic_load) + np.abs(elastic_vectors) @ np.abs(forces)
-    )
+    deflections, coupling = (compliance * elastic_vectors.T).T, vectors[:rigid].T @ resisted
+    flexibility, push = elastic_vectors.T @ deflections, load[:rigid] @ resisted
+    unknowns = _sizes(base, closed_directions, flexibility.diagonal() + sprung * np.abs(spring_compliance), coupling)
+    solve = _solver(flexibility, spring_compliance, sprung, coupling, unknowns)
+    forces, rigid_motion = solve(-offsets - sprung * (elastic_load @ deflections), -push)
+    terms = np.abs(elastic_load) + np.abs(elastic_vectors) @ np.abs(forces)
+    total = drop_round_off(elastic_load + elastic_vectors @ forces, terms)
     configuration = _with_rigid_motion(resisted, rigid_motion, compliance * total)
-    for passed in range(CORRECTIONS):  # of round-off, which soft modes magnify
+    force_sizes, size = np.abs(forces), _with_rigid_motion(resisted, 0 * rigid_motion, compliance * terms)
+    for passed in range(CORRECTIONS):
         violation = offsets + spring_compliance * forces + sprung * (configuration @ vectors)
-        terms = (
+        negligible = PRODUCT * (
             np.abs(offsets) + np.abs(spring_compliance * forces) + sprung * (np.abs(configuration) @ np.abs(vectors))
         )
-        if passed and np.all(np.abs(violation) <= PRODUCT * terms):
+        imbalance = drop_round_off(
+            push + forces @ coupling, np.abs(load[:rigid]) @ np.abs(resisted) + np.abs(forces) @ np.abs(coupling)
+        )
+        if passed and not imbalance.any() and np.all(np.abs(violation) <= negligible):
             break
-        correction, rigid_motion = solve(-violation, np.zeros(len(rigid_motion)))
-        forces = forces + correction
-        configuration = configuration + _with_rigid_motion(resisted, rigid_motion, deflections @ correction)
+        correction, rigid_motion = solve(-violation, -imbalance)
+        moved = _with_rigid_motion(resisted, rigid_motion, deflections @ correction)
+        force_sizes = force_sizes + np.abs(correction)
+        forces = drop_round_off(forces + correction, force_sizes)
+        configuration = drop_round_off(configuration + moved, np.abs(configuration) + np.abs(moved) + size)
+        size = np.zeros(len(load))
     return forces, configuration
 
 
@@ -203,14 +217,15 @@ def _with_rigid_motion(resisted: np.ndarray, rigid_motion: np.ndarray, elastic: 
 Solver: TypeAlias = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def _solver(flexibility: np.ndarray, spring_compliance: np.ndarray, sprung: np.ndarray, coupling: np.ndarray) -> Solver:
+def _solver(
+    flexibility: np.ndarray, spring_compliance: np.ndarray, sprung: np.ndarray, coupling: np.ndarray, sizes: np.ndarray
+) -> Solver:
     """Solver for f (d,), z (k,) of [[S F + C, S coupling], [coupling^T, 0]] (f, z) = (a, b), S = 0 or 1.
 
-    Unknowns and rows are scaled, so that pivots do not depend on units. Where springs cancel and the matrix is
-    singular, the solution is the shortest one.
+    Unknowns, by their sizes (d + k,), and rows are scaled, so that pivots do not depend on units. Where springs cancel
+    and the matrix is singular, the solution is the shortest one.
     """
     d = len(spring_compliance)
-    sizes = _sizes(flexibility.diagonal() + sprung * np.abs(spring_compliance), coupling)
     matrix = np.zeros((d + coupling.shape[1],) * 2)
     matrix[:d, :d], matrix[:d, d:], matrix[d:, :d] = (
         sprung[:, None] * flexibility,
@@ -234,9 +249,21 @@ def _solver(flexibility: np.ndarray, spring_compliance: np.ndarray, sprung: np.n
     return solve
 
 
-def _sizes(flexibilities: np.ndarray, coupling: np.ndarray) -> np.ndarray:
-    """Return the sizes (d + k,) of the unknowns, by which columns are scaled."""
-    forces = 1 / np.sqrt(np.where(flexibilities > 0, flexibilities, 1.0))
+def _sizes(
+    base: ModalBase, closed_directions: ClosedDirections, flexibilities: np.ndarray, coupling: np.ndarray
+) -> np.ndarray:
+    """Return the sizes (d + k,) of the unknowns, by which columns are scaled.
+
+    The flexibility of a direction gives its force a size. A rigid direction along which the structure moves as a rigid
+    body does not bend: its flexibility is round-off, equilibrium gives its force, and its size is the largest other.
+    """
+    bends = flexibilities > 0
+    if coupling.size:
+        vectors = closed_directions.vectors
+        length, bent = np.linalg.norm(vectors, axis=0), np.linalg.norm(vectors[base.modes.rigid :], axis=0)
+        bends &= ~closed_directions.rigid | (bent > HARDLY_BENDS * length)
+    stiffest = float(np.min(flexibilities[bends])) if np.any(bends) else 1.0
+    forces = 1 / np.sqrt(np.where(bends, flexibilities, stiffest))
     if not coupling.size:
         return np.concatenate([forces, np.ones(coupling.shape[1])])
     largest = float(np.max(np.abs(forces[:, None] * coupling))) or 1.0
