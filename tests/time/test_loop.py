@@ -260,18 +260,21 @@ def test_a_warm_run_without_events_is_made_by_few_calls():
     rest = model.equilibrium({"node3": 1.0})
     for given in ({"displacement": start}, {"start": rest}):
         mp.simulate(model, 1e-3, **given)
-        assert calls_of(lambda given=given: mp.simulate(model, 1e-3, **given)) < 70
+        assert calls_of(lambda given=given: mp.simulate(model, 1e-3, **given)) < 73
 
 
 @pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
 def test_warnings_and_the_ledger_of_a_warm_run_take_few_calls():
-    """The loop has judged what truncation took, and summed the works; runs that are told alike are told once."""
+    """The loop has judged what truncation took, and summed the works; runs that are told alike are told once.
+
+    Only how far a level rests from where it moved is asked of every run.
+    """
     model, start = rig(1e6, 6)
     for _ in range(3):
         run = mp.simulate(model, 1.0, displacement=start)
         assert run.ledger.final > 0  # what it is read from is packed
     assert len(run.warnings) == 2
-    assert calls_of(lambda: warnings_of(run)) < 8
+    assert calls_of(lambda: warnings_of(run)) < 11
     assert calls_of(lambda: run.ledger) < 14
 
 

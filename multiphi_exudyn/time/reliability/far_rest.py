@@ -53,8 +53,8 @@ class FarRest:
         round_off = EPSILON * self.distance * math.sqrt(events + 1)
         if level is None:
             return
-        last = float(np.linalg.norm(level.configuration(trajectory.ending.displacement)))
-        if GROWN * round_off <= LOST * last:  # most runs end far beyond it
+        last = level.configuration(trajectory.ending.displacement)
+        if GROWN * round_off <= LOST * math.sqrt(last.dot(last)):  # most runs end far beyond it
             return
         times = np.linspace(trajectory.t_start, trajectory.t_end, SAMPLES)
         places = trajectory.model.base.coordinates(trajectory.displacement(times))
