@@ -173,6 +173,45 @@ class TestDrivenBack:
         assert run.ledger.impact >= -1e-12
 
 
+class TestBetweenStops:
+    """At the start a mass moves between two stops that both touch it: it strikes them in turn until it is at rest."""
+
+    @staticmethod
+    def struck(e_below, e_above, speed, beside=None):
+        mass = np.diag([2.0, 3.0])
+        stiffness = [[4.0, -1.0], [-1.0, 1.0]] if beside is not None else [[4.0, 0.0], [0.0, 1.0]]
+        structure = mp.LinearStructure(mass, stiffness, points={"x": 0, "beside": 1})
+        below = mp.UnilateralContact("below", {"x": 1.0}, 0.0, restitution=e_below)
+        above = mp.UnilateralContact("above", {"x": -1.0}, 0.0, restitution=e_above)
+        start, loads = (np.zeros(2), np.array([speed, beside or 0.0])), [mp.HarmonicLoad("x", 0.5, 3.0)]
+        return mp.simulate(mp.MultiPhiModel(structure, [below, above], modes="all"), 1.0, *start, loads), loads, start
+
+    @pytest.mark.parametrize(
+        ("e_below", "e_above"), [(0.2, 0.2), (0.5, 0.5), (0.5, 1.0), (0.7, 0.7), (0.3, 0.9), (0.9, 0.9), (0.99, 0.99)]
+    )
+    @pytest.mark.parametrize("speed", [1.0, -1.0, 1e-5])
+    @pytest.mark.parametrize("beside", [None, 0.7])
+    def test_it_loses_its_energy_and_stays(self, e_below, e_above, speed, beside):
+        run, loads, start = self.struck(e_below, e_above, speed, beside)
+        assert run.status == "ok"
+        assert_lawful(run, loads, 1e-11, start)
+        times = np.linspace(0.0, 1.0, 9)
+        assert_allclose(run.displacement(times)[0], 0.0, atol=1e-12)
+        assert_allclose(run.velocity(times)[0], 0.0, atol=1e-12)
+        assert run.ledger.impact == pytest.approx(speed**2, rel=1e-10)
+        first, second = (e_above, e_below) if speed > 0 else (e_below, e_above)
+        impulses = {event.contact: event.impulse for event in run.events if event.kind == "close" and event.impulse}
+        struck, other = ("above", "below") if speed > 0 else ("below", "above")
+        for contact, velocities in ((struck, 1 + first), (other, first * (1 + second))):
+            expected, round_off = 2.0 * abs(speed) * velocities, 1e-11  # of a blow's velocities, also of those beside
+            assert (1 - first * second) * impulses[contact] == pytest.approx(expected, rel=1e-10, abs=round_off)
+
+    def test_without_losses_it_never_comes_to_rest(self):
+        run, _, _ = self.struck(1.0, 1.0, 1.0)
+        assert run.status == "failed"
+        assert "at t = 0 s" in run.message
+
+
 def test_a_moving_stop_gives_its_speed_on():
     """Struck at rest by a stop that rises at s: it leaves with (1 + e) s."""
     structure = mp.LinearStructure([[2.0]], [[0.0]], points={"m": 0})

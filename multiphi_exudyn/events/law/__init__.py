@@ -67,9 +67,10 @@ the functions that implement it:
 11. A rigid contact with restitution e that strikes leaves its stop with -e times its velocity. So do all contacts that
    touch and are struck with it, in one impact (Moreau); coupled ones must have one e. A touching contact that leaves
    its stop has at least the e of those that are struck, or it would gain energy. A contact that others drive back to
-   its stop is struck again at the same instant, at the start too. If any of them has friction, e is that of impulses:
-   an impact without restitution, then one with at least e times its impulses (Poisson). A bounce that is too low or too
-   short to be resolved is the last: it takes as long as all bounces that would follow, and at its end e is zero.
+   its stop is struck again at the same instant, at the start too, until what is left is round-off. If any of them has
+   friction, e is that of impulses: an impact without restitution, then one with at least e times its impulses
+   (Poisson). A bounce that is too low or too short to be resolved is the last: it takes as long as all bounces that
+   would follow, and at its end e is zero.
    -> rebounds.flag_touching, rebounds.set_rebound_speeds, rebounds.lend_restitutions, rebounds.collide_and_rebound,
    rebounds.repeat_impacts, bounces.last_bounce, bounces.mark_last_bounces
 12. Rigid friction elements that stick, reverse or begin to slip at an instant are decided together, those at contacts
