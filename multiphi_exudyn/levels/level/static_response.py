@@ -163,8 +163,8 @@ def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.nda
     """``static_response`` where the directions of rigid contacts are orthogonal.
 
     The solution is corrected until it holds: round-off of y is magnified by soft modes, that of f by a direction that
-    hardly bends (``_sizes``). What a correction takes back is round-off and becomes zero; should that be a displacement
-    of a soft mode, the next correction gives it again.
+    hardly bends (``_sizes``). What a correction takes back is round-off and becomes zero. The first one judges y by the
+    terms of Omega^-2 (f_e + P_e f) too; what that drops of a soft mode's displacement, the next ones give again.
     """
     rigid, compliance, offsets = base.modes.rigid, base.compliance, closed_directions.offsets
     vectors, elastic_vectors, elastic_load = closed_directions.vectors, closed_directions.vectors[rigid:], load[rigid:]
@@ -181,7 +181,7 @@ def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.nda
     terms = np.abs(elastic_load) + np.abs(elastic_vectors) @ np.abs(forces)
     total = drop_round_off(elastic_load + elastic_vectors @ forces, terms)
     configuration = _with_rigid_motion(resisted, rigid_motion, compliance * total)
-    force_sizes, size = np.abs(forces), _with_rigid_motion(resisted, 0 * rigid_motion, compliance * terms)
+    sizes_of_forces, summed = np.abs(forces), _with_rigid_motion(resisted, 0.0 * rigid_motion, compliance * terms)
     for passed in range(CORRECTIONS):
         violation = offsets + spring_compliance * forces + sprung * (configuration @ vectors)
         negligible = PRODUCT * (
@@ -194,10 +194,12 @@ def _response(base: ModalBase, closed_directions: ClosedDirections, load: np.nda
             break
         correction, rigid_motion = solve(-violation, -imbalance)
         moved = _with_rigid_motion(resisted, rigid_motion, deflections @ correction)
-        force_sizes = force_sizes + np.abs(correction)
-        forces = drop_round_off(forces + correction, force_sizes)
-        configuration = drop_round_off(configuration + moved, np.abs(configuration) + np.abs(moved) + size)
-        size = np.zeros(len(load))
+        sizes = np.abs(configuration) + np.abs(moved) + (0.0 if passed else summed)
+        sizes_of_forces = sizes_of_forces + np.abs(correction)
+        forces, configuration = (
+            drop_round_off(forces + correction, sizes_of_forces),
+            drop_round_off(configuration + moved, sizes),
+        )
     return forces, configuration
 
 
