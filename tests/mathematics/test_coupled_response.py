@@ -28,6 +28,30 @@ def moved(response, start, force, t):
     return np.concatenate(response.state(c, t))
 
 
+def precisely(system, start, t):
+    """exp(system t) start: a Taylor series over a short time, squared, in extended precision."""
+    halved = max(0, int(np.ceil(np.log2(np.max(np.sum(np.abs(system * t), axis=1))))) + 2)
+    size = len(system)
+    step, term = np.eye(size, dtype=np.longdouble), np.eye(size, dtype=np.longdouble)
+    for k in range(1, 20):
+        term = term @ system * (t / 2**halved / k)
+        step += term
+    for _ in range(halved):
+        step = step @ step
+    return (step @ start).astype(float)
+
+
+def cancelled(beside, dashpot=(0.5, 1.0), stiffness=1000.0, driven=0.7):
+    """A dashpot between a free mode and an elastic one, on which friction acts; another free mode that it drives.
+
+    Friction takes the damping of the free mode away, but for a relative rest.
+    """
+    squares, row = np.array([0.0, 0.0, stiffness]), np.array([0.0, *dashpot])
+    coupling = np.zeros((3, 3))
+    coupling[:2, 2] = driven * stiffness, (1 + beside) * dashpot[0] / dashpot[1] * stiffness
+    return squares, np.outer(row, row), coupling
+
+
 def pair(beside, square=4.0):
     """Two modes whose eigenvalues merge at omega^2 = ``square``, but for a relative distance."""
     squares = np.array([square - 1.0, square + 1.0])
@@ -93,6 +117,71 @@ class TestFree:
             exact = exactly(np.full(3, 9.0), np.zeros((3, 3)), coupling, start, np.zeros(3), t)
             found = moved(response, start, np.zeros(3), t)
             assert_allclose(found, exact, rtol=0, atol=1e-9 * np.max(np.abs(exact)))
+
+
+RESTS = [0.0, 1e-16, -1e-15, 1e-14, -1e-12, 1e-9, -1e-6, 1e-4, -1e-2, 0.3]
+DASHPOTS = [(0.5, 1.0), (-0.5, 1.0), (0.3, 0.7), (1.1, 0.1), (1e-3, 2e-3)]
+
+
+class TestFrictionThatCancelsDamping:
+    """A rate of (nearly) zero of a part that moves zero-frequency modes: the motion has no quotient of it."""
+
+    @pytest.mark.parametrize("duration", [0.1, 3.0])
+    @pytest.mark.parametrize("driven", [0.0, 0.7])
+    @pytest.mark.parametrize("dashpot", DASHPOTS)
+    @pytest.mark.parametrize("beside", RESTS)
+    def test_moves_as_the_matrix_exponential(self, beside, dashpot, driven, duration):
+        for stiffness in (1000.0, 90.0, 7.3):
+            squares, damping, coupling = cancelled(beside, dashpot, stiffness, driven)
+            response = modal_response(squares, damping, coupling, duration)
+            start, force = np.array([[1.0, -0.4, 0.02], [0.3, -2.0, 1.0]]), np.array([-0.6, 0.8, 0.0])
+            system = np.zeros((7, 7))
+            system[:3, 3:6], system[3:6, :3] = np.eye(3), -np.diag(squares) - coupling
+            system[3:6, 3:6], system[3:6, 6] = -damping, force
+            for t in (duration, duration / 3):
+                exact = precisely(system, np.concatenate([*start, [1.0]]), t)[:6]
+                found = moved(response, start, force, t)
+                assert_allclose(found, exact, rtol=0, atol=3e-11 * np.max(np.abs(exact)))
+
+    @pytest.mark.parametrize("dashpot", DASHPOTS)
+    def test_exactly_cancelled_damping_has_no_need_of_a_duration(self, dashpot):
+        for stiffness in (1000.0, 90.0, 7.3):
+            rates = modal_response(*cancelled(0.0, dashpot, stiffness)).basis.rates
+            assert np.all((rates == 0) | (np.abs(rates) > 1e-8))
+
+    def test_beside_modes_that_are_critically_damped_alike(self):
+        """These form a cluster, and all rates come from another decomposition."""
+        squares, damping, coupling = (np.pad(given, [(0, 2)] * np.ndim(given)) for given in cancelled(0.0))
+        squares[3:], damping[3:, 3:], coupling[3, 4] = 4.0, 0.6 * np.eye(2), 1.0
+        response = modal_response(squares, damping, coupling)
+        start, t = np.array([[1.0, -0.4, 0.02, 0.1, -0.3], [0.3, -2.0, 1.0, 0.0, 0.5]]), 2.0
+        exact = exactly(squares, damping, coupling, start, np.zeros(5), t)
+        assert_allclose(moved(response, start, np.zeros(5), t), exact, rtol=0, atol=1e-9)
+
+    @pytest.mark.parametrize("beside", RESTS)
+    @pytest.mark.parametrize("rate", [0.0, 0.7j, 30j, -0.5 + 2j])
+    def test_solves_its_equation_under_forces(self, beside, rate):
+        squares, damping, coupling = cancelled(beside)
+        response, horizon = modal_response(squares, damping, coupling, 2.0), 2.0
+        forces = np.array([[1.0, -0.5j, 2.0], [0.3, 0.8, -1.0]], complex)
+        x = particular(squares, damping, response, rate, forces, horizon)
+        k = np.arange(len(x))
+
+        def differentiated(c):
+            return rate * c + np.vstack([c[1:], np.zeros((1, 3))]) * (k + 1)[:, None] / horizon
+
+        velocity = differentiated(x)
+        acceleration = differentiated(velocity)
+        left = acceleration + velocity @ damping.T + x @ (np.diag(squares) + coupling).T
+        size = np.max(np.abs(acceleration)) + np.max(np.abs(x)) * np.max(squares)
+        for t in np.linspace(0, horizon, 5):
+            given = (t / horizon) ** np.arange(2) @ forces
+            powers = (t / horizon) ** k
+            assert_allclose(powers @ left, given, rtol=0, atol=1e-11 * size)
+        found = in_buffers(response, squares, damping, rate, forces, horizon)
+        if rate == 0.0:
+            found, x = found.real, x.real
+        assert_allclose(found, x, rtol=0, atol=1e-10 * np.max(np.abs(x)))
 
 
 class TestForced:

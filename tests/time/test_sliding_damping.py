@@ -154,3 +154,48 @@ def test_round_off_of_the_reaction_damps_no_free_motion_along_the_floor(masses, 
     assert run.contact_force("floor", 0.99 * end) == pytest.approx(slid(structure, surface, 0.99 * end)[1], rel=1e-12)
     assert run.ledger.friction > 0
     assert abs(run.ledger.residual) < 1e-12 * run.ledger.initial
+
+
+def pushed_on_by_its_dashpot(mu, dashpot, masses, stiffness=1000.0):
+    """A body on a bar that nothing holds, and the bar: a stop presses them by a dashpot that slides with the body.
+
+    Coordinates: along the stop, of the body and of the bar, and across it. At mu = 1 friction pushes the body on as
+    strongly as the dashpot slows it down: a part of the motion has no damping, and drives the bar.
+    """
+    structure = mp.LinearStructure(
+        np.diag(masses),
+        np.zeros((3, 3)),
+        dashpot * np.outer([1.0, 0.0, 1.0], [1.0, 0.0, 1.0]),
+        {"body": 0, "bar": 1, "across": 2},
+    )
+    contact = mp.UnilateralContact(
+        "stop", "across", 0.0, stiffness=stiffness, friction=mu, tangential=np.array([-1.0, -1.0, 0.0])
+    )
+    return mp.MultiPhiModel(structure, [contact], modes="all")
+
+
+@pytest.mark.parametrize("load", ["constant", "harmonic"])
+@pytest.mark.parametrize(
+    ("dashpot", "masses"), [(1.0, (4.0, 2.0, 1.0)), (0.3, (1.0, 1.0, 1.0)), (2.0, (3.0, 0.7, 0.9))]
+)
+@pytest.mark.parametrize("mu", [1.0, 1 + 1e-15, 1 - 1e-13, 1 + 1e-9, 1 - 1e-5, 1.01, 0.6])
+def test_friction_that_cancels_the_dashpot(mu, dashpot, masses, load):
+    model, weight, turning = pushed_on_by_its_dashpot(mu, dashpot, masses), 4.0 + 5.0 * dashpot, 7.0
+    loads, x, v = [mp.ConstantLoad("across", -weight)], np.array([0.1, 1.0, -0.004]), np.array([-5.0, 0.0, 0.0])
+    if load == "harmonic":
+        loads.append(mp.HarmonicLoad("body", 1.0, turning / (2 * math.pi)))
+    run = mp.simulate(model, 0.3, x, v, loads)
+    assert run.status == "ok"
+    assert not run.warnings
+    assert all(event.time == 0.0 for event in run.events)  # it slides to the end
+    system, k = np.zeros((9, 9)), 1000.0
+    system[:3, 3:6] = np.eye(3)
+    system[3:6, 2] = np.array([-mu * k, -mu * k, -k]) / masses
+    system[3:6, 3:6] = -dashpot * np.outer([1.0, 0.0, 1.0], [1.0, 0.0, 1.0]) / np.array(masses)[:, None]
+    system[5, 6] = -weight / masses[2]
+    system[3, 7], system[7, 8], system[8, 7] = (load == "harmonic") / masses[0], -turning, turning
+    for t in (0.05, 0.3):
+        exact = expm(system * t) @ np.concatenate([x, v, [1.0, 1.0, 0.0]])
+        assert_allclose(run.displacement(t), exact[:3], rtol=0, atol=1e-11)
+        assert_allclose(run.velocity(t), exact[3:6], rtol=0, atol=1e-10)
+    assert abs(run.ledger.residual) < 1e-10 * run.ledger.friction

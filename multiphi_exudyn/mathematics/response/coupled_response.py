@@ -11,8 +11,9 @@ integral. Undamped ones, a, are driven by the others and drive none,
 p is constant on zero-frequency modes, and zero on the others. With B the columns of W for eta', the parts tend to
 y = -T^-1 B p, with which the damped zero-frequency modes drift.
 
-Of a part y' = lambda y that is slow compared with the duration of a motion, the integral y / lambda would be a large
-term with small differences: q' = y is kept as a motion of its own, in powers of time.
+Of a part y' = lambda y that is slow compared with the duration of a motion, the integrals y / lambda and y / lambda^2
+would be large terms with small differences: q' = y, and u' = q that drives undamped modes, are motions of their own, in
+powers of time. So are those of a part with lambda = 0, where friction cancels the damping of a zero-frequency mode.
 """
 
 from __future__ import annotations
@@ -66,15 +67,16 @@ def _coupled(squares: np.ndarray, stiffness: np.ndarray, damping: np.ndarray, du
     shapes[elastic], speeds[moving] = parts.vectors[:e] / scale[:, None], parts.vectors[e:]
     maps[0][:, elastic], maps[1][:, moving] = parts.inverse[:, :e] * scale, parts.inverse[:, e:]
     free, alone = moving[squares[moving] == 0], np.setdiff1d(np.arange(r), moving)
-    driven = -(stiffness[alone] @ shapes + damping[alone] @ speeds)
+    driven = np.zeros((r, len(parts.rates)), complex)
+    driven[alone] = -(stiffness[alone] @ shapes + damping[alone] @ speeds)
     slow = _slow(parts, speeds[free], driven, duration)
+    fast, is_alone = ~slow, np.isin(np.arange(r), alone) & ~np.any(driven, axis=1)
+    fast_columns = parts.only(fast), shapes[:, fast], speeds[:, fast], maps[:, fast], driven[:, fast]
+    response = _of_parts(*fast_columns, stiffness, damping, free, alone, is_alone)
     if not slow.any():
-        return _of_parts(parts, shapes, speeds, maps, driven, stiffness, damping, free, alone)
-    slow_columns, fast = (shapes[:, slow], speeds[:, slow], maps[:, slow]), ~slow
-    zero = np.zeros((len(alone), int(fast.sum())))
-    fast_columns = parts.only(fast), shapes[:, fast], speeds[:, fast], maps[:, fast], zero
-    slow_motion = _slow_motion(parts.rates[slow], *slow_columns, free, duration)
-    return _sum(_of_parts(*fast_columns, stiffness, damping, free, alone), slow_motion)
+        return response
+    slow_columns = shapes[:, slow], speeds[:, slow], maps[:, slow], driven[:, slow]
+    return _sum(response, _slow_motion(parts.rates[slow], *slow_columns, free, duration))
 
 
 def _of_parts(
@@ -87,37 +89,45 @@ def _of_parts(
     damping: np.ndarray,
     free: np.ndarray,
     alone: np.ndarray,
+    is_alone: np.ndarray,
 ) -> ModalResponse:
     """Return the motion of the parts and of zero-frequency modes; shapes (r, k) are set for elastic modes before."""
     if len(free):
         shapes[free] = _integral(speeds[free], parts)
     if np.any(driven):
-        shapes[alone] = _integral(_integral(driven, parts), parts)
-    response = _sum(_motion_of_parts(parts, shapes, maps), _initial_drift(parts, shapes, maps, free, alone))
+        shapes[alone] = _integral(_integral(driven[alone], parts), parts)
+    response = _sum(_motion_of_parts(parts, shapes, maps), _initial_drift(parts, shapes, maps, free, alone, is_alone))
     if not len(free):
         return response
     return _with_drift(response, parts, shapes, speeds, maps, stiffness, damping, free, alone)
 
 
 def _slow(parts: Parts, speeds: np.ndarray, driven: np.ndarray, duration: float) -> np.ndarray:
-    """Return which components (k,) are slow; none if the speeds (f, k) of damped zero-frequency modes are zero.
+    """Return which components (k,) are slow; none if no zero-frequency mode moves with the components.
 
-    driven: accelerations (a, k) of driven modes; if there are any, no component is treated as slow.
+    speeds (f, k) of damped zero-frequency modes, driven: accelerations (r, k) of undamped ones.
     """
     is_slow_component = np.zeros(len(parts.rates), bool)
-    if not np.any(driven) and np.any(speeds):
+    if np.any(speeds) or np.any(driven):
         for first, end in parts.groups:
             is_slow_component[first] = end - first == 1 and bool(is_slow(parts.rates[first], duration))
     return is_slow_component
 
 
 def _slow_motion(
-    rates: np.ndarray, shapes: np.ndarray, speeds: np.ndarray, maps: np.ndarray, free: np.ndarray, duration: float
+    rates: np.ndarray,
+    shapes: np.ndarray,
+    speeds: np.ndarray,
+    maps: np.ndarray,
+    driven: np.ndarray,
+    free: np.ndarray,
+    duration: float,
 ) -> ModalResponse:
-    """Return the motion of slow parts (s,) in powers of time: V y, X q on free modes, q' = y, y' = lambda y + p.
+    """Return the motion of slow parts (s,) in powers of time: V y, X q on free modes and R u on driven ones.
 
-    q = y(0) t + ..., y = y(0) + ... and the other terms are a exp(lambda t) integrated twice and once, a = lambda y(0)
-    + p. shapes, speeds (r, s): V of elastic modes, and eta', X of the others. maps (2, s, r): y(0) from eta and eta'.
+    u' = q, q' = y, y' = lambda y + p: u = y(0) t^2 / 2 + ..., q = y(0) t + ..., y = y(0) + ... and the other terms are
+    a exp(lambda t) integrated three times, twice and once, a = lambda y(0) + p. shapes, speeds, driven (r, s): V of
+    elastic modes, and eta', X of damped and R of undamped others. maps (2, s, r): y(0) from eta and eta'.
     """
     r, powers, columns, rows, chains = len(shapes), list[int](), list[np.ndarray](), list[np.ndarray](), list[Chain]()
     for k, rate in enumerate(rates.tolist()):
@@ -130,8 +140,17 @@ def _slow_motion(
         columns += [drift] * (len(weights) + 2) + [shapes[:, k]] * (len(weights) + 2)
         rows += [0 * start, start, *(weight * acceleration for weight in weights)]
         rows += [start, acceleration, *(weight * rate * acceleration for weight in weights)]
-        mixing = np.array([[0.0, 1.0], [0.0, rate]])
-        chains.append(Chain(mixing, np.column_stack([drift, shapes[:, k]]), np.stack([np.zeros(r), maps[1, k]])))
+        mixing, places = np.array([[0.0, 1.0], [0.0, rate]]), [drift, shapes[:, k]]
+        if np.any(driven[:, k]):
+            powers += range(len(weights) + 3)
+            columns += [driven[:, k]] * (len(weights) + 3)
+            rows += [0 * start, 0 * start, start / 2]
+            rows += [weight / power * acceleration for power, weight in enumerate(weights, start=3)]
+            mixing = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, rate]])
+            places = [driven[:, k], *places]
+        pushes = np.zeros((len(places), r), complex)
+        pushes[-1] = maps[1, k]
+        chains.append(Chain(mixing, np.column_stack(places), pushes))
     basis = Exponentials(np.zeros(len(powers), complex), np.array(powers))
     maps_of_terms = np.concatenate([np.stack(rows, axis=1), np.array(columns)[None]])
     return ModalResponse(basis, maps_of_terms, np.zeros(r, bool), np.zeros(len(powers), bool), tuple(chains))
@@ -172,9 +191,12 @@ def _motion_of_parts(parts: Parts, shapes: np.ndarray, maps: np.ndarray) -> Moda
 
 
 def _initial_drift(
-    parts: Parts, shapes: np.ndarray, maps: np.ndarray, free: np.ndarray, alone: np.ndarray
+    parts: Parts, shapes: np.ndarray, maps: np.ndarray, free: np.ndarray, alone: np.ndarray, is_alone: np.ndarray
 ) -> ModalResponse:
-    """Return the further motion of zero-frequency modes: a of damped ones, a + b t + p t^2 / 2 of undamped ones."""
+    """Return the further motion of zero-frequency modes: a of damped ones, a + b t + p t^2 / 2 of undamped ones.
+
+    is_alone (r,): undamped ones that nothing drives.
+    """
     r, f, a = len(shapes), len(free), len(alone)
     rate_shapes = shapes @ parts.mixing
     modes, unit = np.concatenate([free, np.repeat(alone, 3)]), np.eye(r)
@@ -192,14 +214,11 @@ def _initial_drift(
     maps_of_terms[2][starts + 2] = 0.5 * unit[alone]
     powers = np.concatenate([np.zeros(f, int), np.tile([0, 1, 2], a)])
     basis = Exponentials(np.zeros(len(powers), complex), powers)
-    poles, is_alone = np.arange(len(powers)) < f, np.zeros(r, bool)
-    chains = list[Chain]()
+    poles, chains = np.arange(len(powers)) < f, list[Chain]()
     for mode, start in zip(alone.tolist(), starts.tolist(), strict=True):
-        if np.any(shapes[mode]):
+        if not is_alone[mode]:
             column = np.column_stack([unit[mode], np.zeros(r)]).astype(complex)
             chains.append(Chain(np.eye(2, k=1, dtype=complex), column, maps_of_terms[1][start : start + 2]))
-        else:
-            is_alone[mode] = True
     return ModalResponse(basis, maps_of_terms, is_alone, poles, tuple(chains))
 
 

@@ -8,7 +8,8 @@ T is diagonal where A has a complete set of eigenvectors, independent by more th
 
     exp(T t) = exp(lambda t) sum_k N^k t^k / k!,   N = T - lambda I,   lambda the cluster's mean
 
-A conjugate pair is kept once, with its weight doubled.
+A conjugate pair is kept once, with its weight doubled. A rate that is round-off of its terms W A V is zero: so it is
+where friction cancels damping.
 Source: G. H. Golub, C. F. Van Loan, Matrix Computations, 4th ed. 2013, ch. 7.6 and 9.1.
 """
 
@@ -20,7 +21,7 @@ import numpy as np
 import scipy.linalg
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.mathematics.round_off import DEFECTIVE, WORST_CONDITION
+from multiphi_exudyn.mathematics.round_off import DEFECTIVE, WORST_CONDITION, drop_round_off
 
 __all__ = ["Parts", "parts_of"]
 
@@ -78,9 +79,12 @@ def parts_of(system: np.ndarray) -> Parts:
 
 def _single(system: np.ndarray, rates: np.ndarray, vectors: np.ndarray) -> Parts:
     is_upper = rates.imag >= 0
-    inverse = _real_part_inverse(vectors[:, is_upper], rates[is_upper].imag > 0)
-    groups = tuple((i, i + 1) for i in range(int(np.sum(is_upper))))
-    return Parts(rates[is_upper], vectors[:, is_upper], inverse, np.diag(rates[is_upper]), groups)
+    rates, vectors = rates[is_upper], vectors[:, is_upper]
+    inverse = _real_part_inverse(vectors, rates.imag > 0)
+    terms = np.sum(np.abs(inverse) * (np.abs(system) @ np.abs(vectors)).T, axis=1)
+    rates = drop_round_off(rates, terms)
+    groups = tuple((i, i + 1) for i in range(len(rates)))
+    return Parts(rates, vectors, inverse, np.diag(rates), groups)
 
 
 def _clusters(rates: np.ndarray, distance: float) -> list[np.ndarray]:
@@ -126,7 +130,9 @@ def _block(system: np.ndarray, rates: np.ndarray, members: np.ndarray) -> tuple[
 
     triangle, basis, count = scipy.linalg.schur(system, output="complex", sort=chosen)
     assert count == len(members), "the same iteration finds the same rates"
-    return basis[:, :count], triangle[:count, :count]
+    mixing = triangle[:count, :count].copy()
+    np.fill_diagonal(mixing, drop_round_off(np.diagonal(mixing), np.linalg.norm(system)))
+    return basis[:, :count], mixing
 
 
 def _refined(system: np.ndarray, rates: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
