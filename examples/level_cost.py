@@ -1,10 +1,9 @@
 """What a new level costs, one contact away from the open one: all that its first event needs.
 
 A cantilever of 200 degrees of freedom over stops, all of its modes in the base, 12 in a level. Of every level the modes
-are found first; then the loop is given its motion, gaps and exits, the map to it and the map back, and the forms from
-which a ledger is summed. CPU time of this thread up to each of these, median of many new levels; code and base are
-warm. Threads of BLAS that have built the base spin for a while after it, and are not counted. A first run with two new
-levels took 6 to 9 ms a level at commit de51912.
+are found first; then the core is given the level, and makes its motion, gaps and guards, the map to it and the map
+back. CPU time of this thread up to each of these, median of many new levels; code and base are warm. Threads of BLAS
+that have built the base spin for a while after it, and are not counted.
 
 Run: python examples/level_cost.py
 """
@@ -14,21 +13,18 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Sequence
 
 import numpy as np
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.packing.level_arrays import LevelArrays
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
+from multiphi_exudyn.time.core_levels import core_levels
 
 LENGTH, ELEMENTS, STOPS, GAP = 1.0, 100, 12, 1e-3  # m, , , m
 MODES, ROUNDS = 12, 20
 STIFFNESSES = {"compliant": 1e6, "rigid": math.inf}  # N/m
 DAMPINGS = {"Rayleigh damping": mp.RayleighDamping(0.5, 1e-6), "modal damping": mp.ModalDamping(0.01)}
-STEPS = ("level", "packing", "map", "map back", "ledger's forms")
-BEFORE = "6 to 9 ms"  # a level of a first run with two new ones, at commit de51912
+STEPS = ("level", "in the core", "map", "map back")
 
 
 def cantilever(stiffness: float, damping: mp.RayleighDamping | mp.ModalDamping) -> mp.MultiPhiModel:
@@ -42,33 +38,18 @@ def cantilever(stiffness: float, damping: mp.RayleighDamping | mp.ModalDamping) 
     return model
 
 
-def supply(arrays: LevelArrays, needed: int, source: int, states: Sequence[int]) -> None:
-    """Give the loop what it asks for: a level, a map, or forms of the level ``source``."""
-    ints = arrays.ints
-    ints[a.NEEDED], ints[a.NEEDED_FROM] = needed, source
-    key = int(ints[a.NEEDED_KEY])
-    ints[key : key + len(states)] = states
-    arrays.supply()
-
-
 def costs(model: mp.MultiPhiModel) -> list[list[float]]:
     """CPU times [ms] of every level one contact away from the open one, up to the end of each of the ``STEPS``."""
-    arrays, rows = LevelArrays(LoadedLevels.static(model, np.zeros(model.base.modes.count))), list[list[float]]()
-    nowhere = [0] * len(model.contacts)
-    open_level = arrays.level(nowhere)
+    levels, rows = core_levels(LoadedLevels.static(model, np.zeros(model.base.modes.count))), list[list[float]]()
+    open_level = levels.level([0] * len(model.contacts))
     for i in range(len(model.contacts)):
-        states = [int(k == i) for k in range(len(model.contacts))]
         times = [time.thread_time()]
         model.level_at((i,))
         times.append(time.thread_time())
-        new = arrays.level(states)
+        new = levels.level([int(k == i) for k in range(len(model.contacts))])
         times.append(time.thread_time())
-        for needed, source, target in (
-            (a.NEED_MAP, open_level, states),
-            (a.NEED_MAP, new, nowhere),
-            (a.NEED_POWERS, new, states),
-        ):
-            supply(arrays, needed, source, target)
+        for source, target in ((open_level, new), (new, open_level)):
+            levels.transition(source, target)
             times.append(time.thread_time())
         rows.append([1e3 * (end - times[0]) for end in times[1:]])
     return rows
@@ -89,7 +70,7 @@ def main(rounds: int = ROUNDS) -> dict[str, list[float]]:
     for name, found in medians.items():
         lowest = np.percentile(rows[name], 10, axis=0).tolist()
         shown = (f"{step} {value:.2f} ({low:.2f})" for step, value, low in zip(STEPS, found, lowest, strict=True))
-        print(f"{name:27s} up to {', '.join(shown)} ms; before {BEFORE}")
+        print(f"{name:27s} up to {', '.join(shown)} ms")
     return medians
 
 

@@ -18,43 +18,14 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from multiphi_exudyn._core import split_steps
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
 from multiphi_exudyn.mechanics.structures.structure import LinearStructure
 from reference_models.craig_bampton import craig_bampton
 from reference_models.stepwise import StepwiseHistories
 
-__all__ = ["Splitting", "SplittingRun", "split_steps", "splitting"]
-
-
-@compiled
-def split_steps(
-    modes: int, contacts: int, steps: int, step: float, flow: Numbers, rows: Numbers, laws: Numbers, record: Numbers
-) -> None:
-    """Steps from the first state (z, z') of the record (steps + 1, 2 modes); flow: (4, modes) of a free step."""
-    for k in range(steps):
-        at = 2 * modes * k
-        after = at + 2 * modes
-        for i in range(2 * modes):
-            record[after + i] = record[at + i]
-        for part in range(2):
-            for c in range(contacts):
-                gap = laws[2 * c]
-                for i in range(modes):
-                    gap += rows[c * modes + i] * record[after + i]
-                if gap < 0.0:
-                    kick = -0.5 * step * laws[2 * c + 1] * gap
-                    for i in range(modes):
-                        record[after + modes + i] += kick * rows[c * modes + i]
-            if part == 0:
-                for i in range(modes):
-                    z, speed = record[after + i], record[after + modes + i]
-                    record[after + i] = flow[i] * z + flow[modes + i] * speed
-                    record[after + modes + i] = flow[2 * modes + i] * z + flow[3 * modes + i] * speed
-
-
-_split_steps = entry(split_steps)
+__all__ = ["Splitting", "SplittingRun", "splitting"]
 
 
 @dataclass(frozen=True)
@@ -79,8 +50,7 @@ class Splitting:
         record = np.zeros((steps + 1, 2 * modes))
         record[0, :modes] = self.weights @ displacement
         flow = _free_flow(self.squares, self.damping, step)
-        sizes = modes, len(self.contacts), steps
-        _split_steps(*sizes, step, flow.ravel(), self.rows.ravel().copy(), self.laws.ravel().copy(), record.reshape(-1))
+        split_steps(step, flow, self.rows, self.laws, record)
         return SplittingRun(self, step, record)
 
 

@@ -1,6 +1,6 @@
 """Command line of the package.
 
-Order: options, animate_command, budget_command, compare_command, compile_command, file_commands, needs_command,
+Order: options, animate_command, budget_command, compare_command, file_commands, needs_command,
 stability_command, study_command, main.
 """
 

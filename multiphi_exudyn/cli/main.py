@@ -1,12 +1,11 @@
 """Command line.
 
-    multiphi-exudyn compare | animate | budget | needs | study | stability | new | validate | schema | compile | scenes
+    multiphi-exudyn compare | animate | budget | needs | study | stability | new | validate | schema | scenes
                     | studies
 
 Exit code 0 if every requested model ran, 1 if one failed, 2 for bad input, with one line on stderr. For a study: 0 if
 all references and budgets, and at least one setting of every method, ran; failed settings are rows with their cause.
-For validate: 0 if the file is valid. For stability: 0 if no case is wrong. For compile: 0 if the compiled code is
-stored.
+For validate: 0 if the file is valid. For stability: 0 if no case is wrong.
 
 The module of a command is loaded when the command runs, so that ``--help`` is fast.
 """
@@ -85,7 +84,7 @@ def parser() -> argparse.ArgumentParser:
     commands = top_parser.add_subparsers(
         dest="command",
         required=True,
-        metavar="{compare,animate,budget,needs,study,stability,new,validate,schema,compile,scenes,studies}",
+        metavar="{compare,animate,budget,needs,study,stability,new,validate,schema,scenes,studies}",
     )
 
     def add(
@@ -175,13 +174,6 @@ def parser() -> argparse.ArgumentParser:
     )
     schema.add_argument("kind", choices=KINDS, help="of which file")
     schema.add_argument("--markdown", action="store_true", help="all fields as a page to read instead (default: JSON)")
-    add(
-        "compile",
-        _compile,
-        "compile the event loop now, so that the first run does not have to",
-        "For a container, or the workers of a cluster (NUMBA_CPU_NAME names their processor).",
-        "compile",
-    )
     add("scenes", _scenes, "list the shipped scenes, which compare, animate, budget and needs take", "", "scenes")
     add("studies", _studies, "list the shipped studies, which study takes", "", "studies")
     return top_parser
@@ -239,12 +231,6 @@ def _schema(options: argparse.Namespace) -> bool:
     from multiphi_exudyn.cli.file_commands import run_schema
 
     return run_schema(options.kind, options.markdown)
-
-
-def _compile(options: argparse.Namespace) -> bool:
-    from multiphi_exudyn.cli.compile_command import run_compile
-
-    return run_compile()
 
 
 def _scenes(options: argparse.Namespace) -> bool:

@@ -9,7 +9,6 @@ from tqdm import tqdm
 
 from multiphi_exudyn.cli.options import results_folder
 from multiphi_exudyn.files import write_whole
-from multiphi_exudyn.mathematics.compiling.compiled import available, compile_entries
 from multiphi_exudyn.study.running.environment import environment
 from multiphi_exudyn.study.stability.catalogue_run import FULL_LENGTH, QUICK, chosen_cases, run_case
 from multiphi_exudyn.study.stability.report import render_stability, text_table
@@ -24,9 +23,6 @@ def run_stability(name: str | None, quick: bool, out: Path | None) -> bool:
     folder = results_folder(out or Path(f"multiphi-stability{'-quick' if quick else ''}"))
     results = []
     with tqdm(total=len(cases), disable=None, unit="case") as bar:
-        bar.set_description("compiling")
-        if available():
-            compile_entries()  # before any time limit starts
         for case in cases:
             bar.set_description(case.name)
             results.append(run_case(case, QUICK if quick else FULL_LENGTH))

@@ -9,8 +9,7 @@ equilibria. Where the equations are stated:
     (38.4)  x = Phi_l eta + x_inf,l                       level/level.Level.asymptotic
     (38.5)  x_inf,l of gaps and loads                     level/static_response.static_response
 
-Their solution in time is mathematics/response/free_response.py, of loads that vary
-mathematics/response/forced_response.py.
+Their solution in time is core/response.hpp, of loads that vary core/forced_response.hpp.
 
-Order: base, level, equilibrium, model.
+Order: base, level, equilibrium, model, core_model.
 """

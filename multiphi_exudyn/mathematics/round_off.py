@@ -11,16 +11,13 @@ import math
 
 import numpy as np
 
-__all__ = ["ALIKE", "BALANCED", "CLEAR", "DEFECTIVE", "FOLLOWING", "INDEPENDENT", "MASSLESS", "PRODUCT", "SLOW"]
-__all__ += ["WORST_CONDITION", "ZERO", "all_finite", "drop_round_off", "sign_of"]
+__all__ = ["BALANCED", "CLEAR", "FOLLOWING", "INDEPENDENT", "MASSLESS", "PRODUCT", "SLOW"]
+__all__ += ["ZERO", "all_finite", "drop_round_off", "power_of_two_above", "sign_of"]
 
 ZERO = 1e-13  # of the sum of |terms|: a sum below it is round-off
-DEFECTIVE = 1e5  # condition of eigenvectors, from which close ones form a cluster; at a double root 1e8
-WORST_CONDITION = 1e7  # of eigenvectors without clusters; times round-off it is the error of the motion
 PRODUCT = 1e-15  # of two unit vectors: an absolute value below it is the round-off of their scalar product
 INDEPENDENT = 1e-10  # of its length: a direction with a smaller remainder beside others depends on them
 FOLLOWING = 10 * INDEPENDENT  # of its terms: allowed violation of an inequality that depends on others
-ALIKE = 1e-10  # of the larger one: two violations, distances or reserves that are equal but for round-off
 SLOW = 0.1  # of 1 / |lambda|: a shorter motion is given by a few powers of time, without 1 / lambda
 BALANCED = 1e-9  # of the sum of |forces|: a resultant below it is round-off of their directions and of modes
 MASSLESS = 1e-9  # of the terms of M z: a smaller remainder is round-off of matrices in files, the motion has no mass
@@ -49,3 +46,8 @@ def sign_of(terms: np.ndarray, constant: float, size: float = 0.0) -> int:
     if abs(value) <= ZERO * (sum(map(abs, values)) + abs(constant) + size):
         return 0
     return 1 if value > 0 else -1
+
+
+def power_of_two_above(value: float) -> float:
+    """Return the smallest power of two that is larger than a positive value."""
+    return math.ldexp(1.0, math.frexp(value)[1])

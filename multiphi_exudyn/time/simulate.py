@@ -13,14 +13,12 @@ from typing import Protocol
 
 import numpy as np
 
-from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.events.excitation.excitation import Excitation
-from multiphi_exudyn.events.packing.start_arrays import Start
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.model.mode_choice import Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mathematics.compiling.compiled import available
 from multiphi_exudyn.mechanics.loads.loads import Load, patterns, unchanging
 from multiphi_exudyn.mechanics.loads.moving_supports import StopsMotion
 from multiphi_exudyn.mechanics.loads.time_functions import Harmonic
@@ -28,7 +26,7 @@ from multiphi_exudyn.mechanics.structures.arguments import is_real
 from multiphi_exudyn.time.reliability.run_warnings import warnings_of
 from multiphi_exudyn.time.reliability.truncation import run_with_enough_modes
 from multiphi_exudyn.time.run.continuation import continued_start, with_final_velocity
-from multiphi_exudyn.time.run.motion import Motion, motion_of
+from multiphi_exudyn.time.run.motion import Motion
 from multiphi_exudyn.time.run.refinement import to_tolerance
 from multiphi_exudyn.time.run.start import first_start
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
@@ -53,7 +51,6 @@ def simulate(
     displacement: np.ndarray | None = None,
     velocity: np.ndarray | None = None,
     loads: Sequence[Load] = (),
-    compiled: bool | None = None,
     start: Trajectory | Equilibrium | None = None,
 ) -> Trajectory:
     """Motion of a model from 0 to ``t_end``, or from the end of another trajectory; exact between contact events.
@@ -74,9 +71,6 @@ def simulate(
         x [m, rad] and x' [m/s, rad/s] at t = 0, None for zero; not modified.
     loads : sequence of loads, default ()
         ConstantLoad, Gravity, HarmonicLoad, SampledLoad, FunctionLoad, SweepLoad, StopMotion, BaseMotion.
-    compiled : bool, default None
-        False runs the loop as plain Python; True the compiled one; None the compiled one, and plain Python where numba
-        is not installed. The answer is the same to round-off.
     start : Trajectory or Equilibrium, default None
         A trajectory of the same model: the run continues from its complete final state, held places of friction and
         phases of contacts included, so that a truncated model too moves as it would have without the break. Time and
@@ -99,8 +93,6 @@ def simulate(
     MultiPhiValueError
         For vectors that are not (n,) finite numbers, a time that is not > 0, a start inside a rigid stop, a ``start``
         that failed, is of another model or stands beside a displacement, and points and contacts that there are not.
-    MultiPhiError
-        For compiled=True without numba.
 
     Examples
     --------
@@ -117,10 +109,8 @@ def simulate(
     >>> tr.status, len(tr.contact_intervals("stop"))
     ('ok', 13)
     """
-    if compiled is not None and not isinstance(compiled, bool):
-        raise MultiPhiTypeError(f"compiled: got {compiled!r}, need True, False or None")
     end = checked_end(model, t_end)
-    run = Run(holding(model, loads, start), end, displacement, velocity, loads, compiled, start)
+    run = Run(holding(model, loads, start), end, displacement, velocity, loads, start)
     trajectory = run_with_warnings(run)
     issue(trajectory.warnings)
     return trajectory
@@ -179,9 +169,6 @@ class SharedResources(Protocol):
     def levels(self, key: object, build: Callable[[], LoadedLevels]) -> LoadedLevels:
         """Return the levels under the loads, build once."""
 
-    def motion(self, levels: LoadedLevels, start: Start, compiled: bool | None) -> Motion:
-        """Return a motion in these levels, on arrays that no other run uses at the same time."""
-
 
 @dataclass
 class Run:
@@ -196,7 +183,6 @@ class Run:
     displacement: np.ndarray | None = None
     velocity: np.ndarray | None = None
     loads: Sequence[Load] = ()
-    compiled: bool | None = None
     start: Trajectory | Equilibrium | None = None
     rewound: bool = False
     shared: SharedResources | None = None
@@ -223,14 +209,12 @@ class Run:
         """Motion before its start, with smooth courses of loads interpolated to their tolerance / finer."""
         if self.ahead is not None and finer == 1.0:
             return self.ahead
-        if self.compiled and not available():
-            raise MultiPhiError("compiled: got True without numba, need it: pip install numba")
         before, levels = self._before, self.levels(finer)
         if before is None:
-            start = first_start(levels, self.t_end, self.displacement, self.velocity, self.rest, self.compiled)
+            start = first_start(levels, self.t_end, self.displacement, self.velocity, self.rest)
         else:
             start = continued_start(before, levels, self.rewound)
-        return (motion_of if self.shared is None else self.shared.motion)(levels, start, self.compiled)
+        return Motion(levels, start)
 
     @property
     def _before(self) -> Trajectory | None:

@@ -4,9 +4,9 @@
 
 Case by case, each from its kind and number alone: no exception but a named one, and what must hold of every run
 (study/stability, run_laws.py and law_check.py). All kinds (campaign_scenes) but "plain" (strategies.py) and "lattice"
-are judged by brute force (campaign_judge.py), one in PLAIN_PYTHON of the plain ones by the loop as plain Python. With
-``--kernels Prescott,Haswell`` the same cases run under each of these kernels of the linear algebra library, each in its
-own process, and their statuses, numbers of events and answers are compared.
+are judged by brute force (campaign_judge.py). With ``--kernels Prescott,Haswell`` the same cases run under each of
+these kernels of the linear algebra library, each in its own process, and their statuses, numbers of events and answers
+are compared.
 
 Kinds with dry friction: a slider alone, blocks, springs in series ("jenkins"), of all laws under several loads, beside
 contacts that give way, beside rigid ones ("friction impacts"), on bodies that nothing else holds, at rest exactly at
@@ -47,10 +47,8 @@ from multiphi_exudyn.study.sweep.time_limit import TimeLimitExceeded, call_withi
 from reference_models.exudyn_quiet import quiet
 
 CHUNK = 100  # cases written at a time
-LONGEST = 900.0  # s: most cases take a tenth of a second, the first one compiles; a run may never end
-NEAR = 1e-6  # of the largest displacement: the answers under two kernels, and of the two forms of the loop
-PLAIN_PYTHON = 50  # one in so many plain cases, which takes seconds, is run as plain Python too
-NUDGES = (1e-12, -1e-12, 3e-12)  # of a start, whose answers may differ as much
+LONGEST = 900.0  # s: most cases take a tenth of a second; a run may never end
+NEAR = 1e-6  # of the largest displacement: the answers under two kernels
 INSTANTS = 40  # of a run, for its largest speed
 
 ALL_KINDS = ("plain", *KINDS)
@@ -99,24 +97,12 @@ def _verdicts(number):
         return [("chatter", run.message)]
     told = [*complaints(run), *broken_laws(run, case.loads, (case.displacement, case.velocity))]
     found = [(f"failure: {text.split(':')[0]}", text) for text in told]
-    if number % PLAIN_PYTHON == 0 and (text := apart(run, _run(case, compiled=False))):
-        sensitive = any(apart(run, _run(nudged(case, run, share))) for share in NUDGES)
-        found.append(("sensitive" if sensitive else "failure: plain Python", text))
     return found or [("ok" if run.status == "ok" else "named failure", run.message)]
 
 
-def _run(case, compiled=None):
+def _run(case):
     start = {"displacement": case.displacement, "velocity": case.velocity}
-    return simulate(case.model, case.t_end, **start, loads=case.loads, compiled=compiled)
-
-
-def apart(one, other):
-    """In what two runs differ, "" where they do not."""
-    digests = []
-    for run in (one, other):
-        instants = np.linspace(0, min(one.t_end, other.t_end), INSTANTS)
-        digests.append([run.status, len(run.events), run.displacement(instants).ravel() if run.segments else []])
-    return _differs(*digests)
+    return simulate(case.model, case.t_end, **start, loads=case.loads)
 
 
 def nudged(case, run, share):

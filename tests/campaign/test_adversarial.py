@@ -9,18 +9,14 @@ import math
 
 import numpy as np
 import pytest
-import random_campaign
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_campaign import main, nudged, recipe_of, verdicts
-from strategies import CHOICES, Recipe, built, cases, recipes
+from strategies import CHOICES, Recipe, built, cases
 
 from multiphi_exudyn import ConstantLoad, LinearStructure, MultiPhiModel, UnilateralContact, simulate
-from multiphi_exudyn.mathematics.search import signal_bounds
-from multiphi_exudyn.mathematics.search.zero_crossing import NONE, first_descent
 from multiphi_exudyn.study.stability.run_laws import complaints, missed
 from multiphi_exudyn.study.stability.run_signals import Signal
-from multiphi_exudyn.time.loop import loop
 from multiphi_exudyn.time.segments.segment import SegmentList
 
 DISTINCT = ("chain", "free chain", "dense", "wide")  # frequencies: of repeated ones a truncated basis may keep any
@@ -97,10 +93,10 @@ FOUND = {
 }
 
 
-def run_of(case, *, compiled=None, **changed):
+def run_of(case, **changed):
     given_case = dataclasses.replace(case, **changed)
     start = {"displacement": given_case.displacement, "velocity": given_case.velocity}
-    return simulate(given_case.model, given_case.t_end, **start, loads=given_case.loads, compiled=compiled)
+    return simulate(given_case.model, given_case.t_end, **start, loads=given_case.loads)
 
 
 def comparable(run):
@@ -146,18 +142,16 @@ RESTS = {
 }
 
 
-@pytest.mark.parametrize("compiled", [False, None])
 @pytest.mark.parametrize("name", RESTS)
-def test_what_could_bounce_for_ever_comes_to_rest(name, compiled):
+def test_what_could_bounce_for_ever_comes_to_rest(name):
     """At speeds of the round-off of an impact it is still one: which contacts are at rest is told by all of them."""
     recipe, most = RESTS[name]
-    run = run_of(built(recipe), compiled=compiled)
+    run = run_of(built(recipe))
     assert run.status == "ok"
     assert 2 <= run.stats.events <= most
 
 
-@pytest.mark.parametrize("compiled", [False, None])
-def test_a_contact_between_parts_is_blind_to_their_common_motion(compiled):
+def test_a_contact_between_parts_is_blind_to_their_common_motion():
     """What round-off leaves of it in the direction of a contact would be an effective mass of 1e30 kg."""
     case = built(Recipe(22821, "free chain", 5, "modal", 2, "mixed", "zero", "between", "one", "moving", "gravity"))
     assert np.all(case.model.base.directions[0] == 0)
@@ -200,20 +194,6 @@ class TestTwoRoutesOneAnswer:
         state = {"displacement": first.displacement(first.t_end), "velocity": first.velocity(first.t_end)}
         second = run_of(case, t_end=case.t_end - first.t_end, **state)
         assert_near(second.displacement(second.t_end), whole.displacement(whole.t_end))
-
-    @settings(max_examples=12)
-    @given(recipes())
-    def test_density_of_samples_changes_nothing(self, recipe):
-        plain, refined = run_of(built(recipe)), self._refined(built(recipe), 7.0)
-        if comparable(plain) and not sensitive(built(recipe), plain.t_end):
-            assert refined.status == "ok"
-            assert_near(refined.displacement(plain.t_end), plain.displacement(plain.t_end))
-
-    @staticmethod
-    def _refined(case, refine):
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(signal_bounds, "RESOLUTION", signal_bounds.RESOLUTION / refine**4)
-            return run_of(case, compiled=False)
 
     @settings(max_examples=12)
     @given(cases())
@@ -307,20 +287,21 @@ class TestTheChecksSee:
 
     CASE = Recipe(5, "chain", 3, "none", 1, "compliant", "small", "below", "all", "moving", "none")
 
-    def test_a_missed_event(self, monkeypatch):
-        monkeypatch.setattr(loop, "first_descent", lambda *given: NONE)
-        run = run_of(built(self.CASE), compiled=False)
-        assert any(text.startswith("missed: c0") for text in complaints(run))
-        assert missed(run, run.segments, 24.0) is not None
+    def ending(self, run, end):
+        """The run whose first segment ends at another time, as if its event had been found there."""
+        first, *others = run.segments
+        return dataclasses.replace(run, segments=SegmentList([dataclasses.replace(first, end=end), *others]))
 
-    def test_an_event_that_comes_late(self, monkeypatch):
-        def late(ints, numbers, waves, *given):
-            found = first_descent(ints, numbers, waves, *given)
-            numbers[given[-1]] += 1e-6
-            return found
+    def test_a_missed_event(self):
+        run = run_of(built(self.CASE))
+        wrong = self.ending(run, run.t_end)
+        assert any(text.startswith("missed: c0") for text in complaints(wrong))
+        assert missed(wrong, wrong.segments, 24.0) is not None
 
-        monkeypatch.setattr(loop, "first_descent", late)
-        assert any(text.startswith("missed: c0") for text in complaints(run_of(built(self.CASE), compiled=False)))
+    def test_an_event_that_comes_late(self):
+        run = run_of(built(self.CASE))
+        late = self.ending(run, run.segments[0].end + 1e-6)
+        assert any(text.startswith("missed: c0") for text in complaints(late))
 
     def test_energy_out_of_nothing(self):
         run = run_of(built(self.CASE))
@@ -353,12 +334,12 @@ class TestCampaign:
         assert {recipe_of(k).structure for k in range(100)} == set(CHOICES["structure"])
 
     @pytest.mark.parametrize("number", [2316, 4785])
-    def test_a_start_at_rest_is_nudged_too(self, number):
+    def test_a_start_at_rest_is_right_too(self, number):
         """Two hundred events at the rate of one spring of 1e8 N/m and more: round-off grows to 1e-6."""
         case = built(recipe_of(number))
         assert not np.any(case.displacement)
         assert not np.any(case.velocity)
-        assert {kind for kind, _ in verdicts(number)} <= {"ok", "sensitive"}
+        assert verdicts(number) == [("ok", "")]
 
     @pytest.mark.parametrize(
         "number",
@@ -368,14 +349,8 @@ class TestCampaign:
             *range(6),
         ],
     )
-    def test_plain_python_gives_the_same_answer(self, number, monkeypatch):
-        monkeypatch.setattr(random_campaign, "PLAIN_PYTHON", 1)
+    def test_cases_that_were_hard_are_right(self, number):
         assert verdicts(number) == [("ok", "")]
-
-    def test_plain_python_that_gives_another_one_is_told(self, monkeypatch):
-        assert verdicts(0) == [("ok", "")]
-        monkeypatch.setattr(loop, "first_descent", lambda *given: NONE)
-        assert [kind for kind, _ in verdicts(0)] == ["failure: plain Python"]
 
     @pytest.mark.parametrize("number", [1933, 109663])
     def test_round_off_of_an_impact_is_rest(self, number):

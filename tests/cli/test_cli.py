@@ -244,7 +244,7 @@ def test_version_and_module_entry():
 
 
 @pytest.mark.parametrize(
-    "name", ["compare", "animate", "budget", "needs", "study", "stability", "new", "validate", "schema", "compile"]
+    "name", ["compare", "animate", "budget", "needs", "study", "stability", "new", "validate", "schema"]
 )
 def test_the_help_of_a_command_has_a_description_and_an_example_that_is_understood(name, capsys):
     with pytest.raises(SystemExit):

@@ -4,13 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from small_structures import chain, stop
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.packing.level_parts import channel_parts, from_base, level_numbers, powers
 from multiphi_exudyn.events.transitions.transition import Transition
 from multiphi_exudyn.study.stability.run_laws import strain_energy
 
@@ -24,8 +23,8 @@ CLOSED = [(), ("stop",), ("soft",), ("stop", "soft"), ("law", "soft")]
 GIVEN = {closed: mp.LevelOverride([0.3, 0.9], [0.1, 0.05]) for closed in CLOSED}
 
 
-def model(overrides=None, modes=4, damping=None):
-    return mp.MultiPhiModel(chain(5, damping=damping, stiffness=10.0), STOPS, modes, overrides or {})
+def model(overrides=None, modes=4):
+    return mp.MultiPhiModel(chain(5, stiffness=10.0), STOPS, modes, overrides or {})
 
 
 def with_and_without(m, closed, loads=LOADS):
@@ -52,11 +51,6 @@ class TestWhileNothingVaries:
         assert_allclose(level.kinetic(xi), alone.kinetic(eta), rtol=1e-13)
         assert_allclose(level.potential(xi[:, 0]), alone.potential(eta[:, 0]), rtol=1e-13)
 
-    def test_damping_takes_up_as_much(self, closed, overrides):
-        alone, level = with_and_without(model(overrides, damping=0.1 * np.eye(5)), closed)
-        r = level.modal.modes
-        assert_allclose(powers(level)[0][:r, :r], powers(alone)[0], atol=1e-14)
-
     def test_the_maps_are_those_without_channels(self, closed, overrides):
         m = model(overrides)
         others = with_and_without(m, ("soft",))
@@ -64,13 +58,12 @@ class TestWhileNothingVaries:
             move, r, s = Transition(other, level), level.modal.modes, other.modal.modes
             assert_allclose(move.matrix[:r, :s], level.modal.vectors.T @ other.modal.vectors, atol=1e-13)
             assert_allclose(move.matrix[r:], np.eye(len(move.matrix) - r, len(move.matrix[0]), s), atol=0)
-            assert_allclose(from_base(level)[0][:r, : m.base.modes.count], level.modal.vectors.T)
 
 
 @pytest.mark.parametrize("modes", [2, "all"])
 @pytest.mark.parametrize("closed", CLOSED)
 def test_energies_in_xi_are_those_of_the_configuration(closed, modes):
-    """The strain energy of base and springs; less the loads at their present values it is the form the loop has."""
+    """The strain energy of base and springs; less the loads at their present values it is the form of the level."""
     m = model(modes=modes)
     _, level = with_and_without(m, closed)
     xi = np.random.default_rng(2).normal(size=level.level.modes)
@@ -96,5 +89,3 @@ def test_levels_of_other_histories_share_what_is_kept():
     again = alone.under(dataclasses.replace(Excitation.of(m, LOADS, 2.0), static=level.excitation.static))
     assert again.level is level.level
     assert again.entries is level.entries
-    assert channel_parts(again).keys() == channel_parts(level).keys()
-    assert_array_equal(level_numbers(again), level_numbers(level))

@@ -26,7 +26,6 @@ def balance(run, velocity, load):
     return structure.mass @ (run.velocity(run.t_end) - velocity) + inner @ weights
 
 
-@pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("seed", [0, 3, 5])
 def test_the_impulses_of_contacts_are_what_the_momentum_lacks(seed):
     random = np.random.default_rng(seed)
@@ -46,7 +45,6 @@ def test_the_impulses_of_contacts_are_what_the_momentum_lacks(seed):
     assert np.max(np.abs(given - needed)) < UNSEEN * np.max(np.abs(needed))
 
 
-@pytest.mark.usefixtures("both_ways")
 def test_a_contact_that_stays_closed_in_the_impact_of_another_takes_its_share():
     """Two masses, coupled by the mass matrix: the first rests on its stop when the second strikes."""
     structure = mp.LinearStructure([[2.0, 1.0], [1.0, 2.0]], np.eye(2), points={"a": 0, "b": 1})

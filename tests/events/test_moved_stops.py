@@ -63,7 +63,6 @@ def test_rigid_stops_that_one_mode_cannot_meet_end_in_no_endless_exchange(kind, 
     assert ended >= 6
 
 
-@pytest.mark.usefixtures("both_ways")
 def test_a_spring_pressed_by_its_moved_stop_holds_energy_at_the_start():
     structure = mp.LinearStructure([[1.0]], [[4.0]], points={"m0": 0})
     model = mp.MultiPhiModel(structure, [mp.UnilateralContact("stop", "m0", 0.0, 10.0)], modes="all")

@@ -105,7 +105,6 @@ def test_no_stop_is_passed_and_a_run_ends_only_where_no_room_is_left(seed, shake
     assert run.ledger.impact >= -1e-12 * size
 
 
-@pytest.mark.usefixtures("both_ways")
 def test_a_stop_that_rises_lifts_the_mass_from_the_fixed_one_beside_it_at_the_instant_it_is_the_faster():
     """z = 0.2 sin t - 0.1 passes the floor at asin(1/2) with 0.2 cos(pi/6) m/s: that is then the speed of the mass."""
     structure = mp.LinearStructure([[1.25]], [[140.0]], points={"m": 0})
@@ -124,7 +123,6 @@ def test_a_stop_that_rises_lifts_the_mass_from_the_fixed_one_beside_it_at_the_in
     assert np.min(run.contact_force("lift", t)) > 90
 
 
-@pytest.mark.usefixtures("both_ways")
 def test_squeezed_between_a_moving_and_a_fixed_stop_the_run_ends_where_they_meet():
     structure = mp.LinearStructure([[1.0]], [[10.0]], points={"m": 0})
     stops = [mp.UnilateralContact("ceiling", {"m": -1.0}, 0.05), mp.UnilateralContact("lift", "m", 0.1)]

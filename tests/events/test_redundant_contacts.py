@@ -36,7 +36,6 @@ def forces(run, t):
     return np.array([float(run.contact_force(f"c{i}", t)) for i in range(len(run.model.contacts))])
 
 
-@pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("at", [0.0, 0.1, 0.25, 0.4, 0.5, 0.77, 1.0])
 def test_at_rest_the_forces_push_and_balance_the_load_and_its_moment(at):
     run = loaded(at, bar(gap=0.0), [0.0, 0.0], 1.0)
@@ -48,7 +47,6 @@ def test_at_rest_the_forces_push_and_balance_the_load_and_its_moment(at):
     assert abs(run.ledger.residual) < ROUND_OFF
 
 
-@pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 6])
 def test_a_symmetric_fall_is_symmetric_though_one_set_of_forces_of_many_need_not_be(count):
     """Of more than two stops an independent set carries the bar: its forces have the sum and the moment of all."""
@@ -62,7 +60,6 @@ def test_a_symmetric_fall_is_symmetric_though_one_set_of_forces_of_many_need_not
     assert all(event.impulse >= 0 for event in run.events)
 
 
-@pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("order", [(0, 1, 2, 3, 4), (2, 4, 0, 3, 1)])
 @pytest.mark.parametrize("at", [0.3, 0.5])
 def test_struck_flat_it_stops_with_all_its_energy_lost_whatever_the_order_of_the_stops(at, order):
@@ -95,7 +92,6 @@ def test_the_stops_between_the_ends_change_no_motion(left, right, at):
     assert np.all(forces(five, 3.0) >= 0)
 
 
-@pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize("speed", [2.0, -2.0])
 def test_stops_at_one_place_pull_no_more_than_one_does_where_truncation_brings_them_back_at_once(speed):
     """A damper to a fast mass takes the pressure off the stop; open, one mode does not hold the fast mass any more.

@@ -24,7 +24,7 @@ from multiphi_exudyn import (
     simulate,
 )
 from multiphi_exudyn.study.stability.run_laws import complaints
-from multiphi_exudyn.time.loop import chatter
+from multiphi_exudyn.time.run import chatter
 from reference_models.rig import rig_beam, rig_contact
 
 DAMPINGS = ("none", "modal", "rayleigh", "given")
@@ -91,7 +91,6 @@ class TestWhateverTheScene:
             assert np.min(force) >= -1e-8 * max(1.0, np.max(np.abs(force)))
 
 
-@pytest.mark.usefixtures("both_ways")
 @pytest.mark.parametrize(("seed", "damping"), [(199, "given"), (1047, "given"), (1429, "modal"), (2747, "given")])
 def test_a_rigid_contact_does_not_wait_for_its_reaction_to_rise_to_zero(seed, damping):
     """Closed at the start, with a reaction that truncation has put below zero and that rises: it opens at once."""
@@ -110,7 +109,6 @@ def test_a_refused_contact_requests_a_change_only_where_it_may_close():
     assert all(segment.end > segment.start for segment in run.segments)
 
 
-@pytest.mark.usefixtures("both_ways")
 class TestSmallestScenes:
     def test_an_impact_that_stops_the_only_mode_holds_it(self):
         """One mode: after the impact its velocity is round-off of the one before, not of itself."""
@@ -198,7 +196,6 @@ class TestSmallestScenes:
         assert_allclose(run.energy(run.t_end), 4.0, rtol=1e-10)
 
 
-@pytest.mark.usefixtures("both_ways")
 class TestNotANumber:
     def test_an_overridden_frequency_that_is_none_is_a_failed_run(self):
         m = MultiPhiModel(chain(2), [stop()], "all", {(): LevelOverride([math.nan])})
@@ -242,7 +239,6 @@ def test_what_random_cases_found(number):
     assert not complaints(run)
 
 
-@pytest.mark.usefixtures("both_ways")
 class TestRedundantContacts:
     """Of contacts that follow from each other a set that is independent carries all: the motion knows no difference."""
 

@@ -9,8 +9,6 @@ from small_structures import chain, oscillator, random_model, stop
 
 import multiphi_exudyn as mp
 
-pytestmark = pytest.mark.usefixtures("both_ways")
-
 
 def started(model, velocity, displacement=None, loads=()):
     """A run so short that nothing happens in it but its start."""

@@ -7,13 +7,12 @@ import pytest
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.packing import level_arrays
+from multiphi_exudyn.exudyn_plugin.coupling import exact_motion
 from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedInertia, PointInertia
 from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import ExactMotion
 from multiphi_exudyn.exudyn_plugin.coupling.interface import _direct_reactions
 from multiphi_exudyn.exudyn_plugin.coupling.modal_force import LevelForces
-from multiphi_exudyn.time.loop import chatter
-from multiphi_exudyn.time.run.motion import carry
+from multiphi_exudyn.time.run import chatter
 from multiphi_exudyn.time.simulate import Run
 
 T_END = 6.0
@@ -57,7 +56,7 @@ def test_a_force_on_the_modes_of_every_level_is_a_load(case):
     velocity = np.linspace(-1.0, -0.5, structure.n)
     native = mp.simulate(model, T_END, velocity=velocity, loads=[mp.ConstantLoad(at, force)])
     motion = Run(model, T_END, None, velocity).begun()
-    exact = ExactMotion(motion, motion.levels, "body", 0.0)
+    exact = ExactMotion(motion.levels, "body", 0.0)
     exact.set_forces(held(model, structure.row(at), force), None)
     found = exact.advance(motion.static_state, 0.0, T_END)
     assert len(native.events) >= 3
@@ -77,7 +76,7 @@ def test_forces_may_change_on_the_way_and_a_trial_leaves_no_trace(case):
     loads = [mp.SampledLoad(at, [0.0, 3.0, np.nextafter(3.0, 4.0), T_END], [force, force, -force / 2, -force / 2])]
     native = mp.simulate(model, T_END, velocity=velocity, loads=loads)
     motion = Run(model, T_END, None, velocity).begun()
-    exact, row = ExactMotion(motion, motion.levels, "body", 0.0), structure.row(at)
+    exact, row = ExactMotion(motion.levels, "body", 0.0), structure.row(at)
     exact.set_forces(held(model, row, force), None)
     exact.advance(motion.static_state, 0.0, 3.0, stop=True, trial=True)
     first = exact.advance(motion.static_state, 0.0, 3.0)
@@ -93,7 +92,7 @@ def test_a_motion_stops_at_its_first_event_and_says_what_was_right_before():
     structure, contacts, force, at = CASES["rigid"]
     model = mp.MultiPhiModel(structure, contacts, modes="all")
     motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
-    exact = ExactMotion(motion, motion.levels, "body", 0.0)
+    exact = ExactMotion(motion.levels, "body", 0.0)
     exact.set_forces(held(model, structure.row(at), force), None)
     reached = exact.advance(motion.static_state, 0.0, T_END, stop=True)
     assert reached.changed
@@ -104,15 +103,14 @@ def test_a_motion_stops_at_its_first_event_and_says_what_was_right_before():
     assert not math.isclose(reached.state.kinetic, reached.state_before.kinetic)
 
 
-def test_arrays_that_have_become_too_large_are_packed_anew(monkeypatch):
+def test_levels_that_have_become_too_large_are_made_anew(monkeypatch):
     structure, contacts, force, at = CASES["two rigid"]
     model = mp.MultiPhiModel(structure, contacts, modes="all")
     found = []
-    for limit in (level_arrays.ARRAY_BYTES, 0):
-        monkeypatch.setattr(level_arrays, "ARRAY_BYTES", limit)
-        monkeypatch.setattr(level_arrays, "FEWEST_LEVELS", 0)
+    for limit in (exact_motion.LEVEL_BYTES, 0):
+        monkeypatch.setattr(exact_motion, "LEVEL_BYTES", limit)
         motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
-        exact, state = ExactMotion(motion, motion.levels, "body", 0.0), motion.static_state
+        exact, state = ExactMotion(motion.levels, "body", 0.0), motion.static_state
         for k in range(6):
             exact.set_forces(held(model, structure.row(at), force), None)
             state = exact.advance(state, float(k), float(k + 1)).state
@@ -124,7 +122,7 @@ def test_arrays_that_have_become_too_large_are_packed_anew(monkeypatch):
 
 @pytest.mark.parametrize("case", CASES)
 def test_bodies_that_take_turns_move_as_each_one_alone(case):
-    """They share arrays, with a third one that fails on the way; some have forces, some masses on their points."""
+    """They share levels, with a third one that fails on the way; some have forces, some masses on their points."""
     structure, contacts, force, at = CASES[case]
     row = structure.row(at)
 
@@ -135,7 +133,7 @@ def test_bodies_that_take_turns_move_as_each_one_alone(case):
         attached = AttachedInertia(np.array([[0.7]]), np.eye(1))
         rows_in = lambda states: in_base @ model.level_at(model.active_links(states)).vectors  # noqa: E731
         inertia = PointInertia(attached, model.base, in_base, rows_in)
-        exact, state = ExactMotion(motion, motion.levels, "body", 0.0), motion.static_state
+        exact, state = ExactMotion(motion.levels, "body", 0.0), motion.static_state
         for k in range(30):
             t = 0.2 * k
             exact.set_forces(held(model, row, size * force * (1 - t / T_END)), inertia if size > 1 else None)
@@ -168,7 +166,7 @@ def test_chatter_is_that_of_one_body_alone(monkeypatch):
     bodies = []
     for _ in range(3):
         motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
-        bodies.append((ExactMotion(motion, motion.levels, "body", 0.0), motion.static_state))
+        bodies.append((ExactMotion(motion.levels, "body", 0.0), motion.static_state))
     for exact, state in bodies:
         exact.set_forces(held(model, structure.row(at), force), None)
         exact.advance(state, 0.0, 2.0)
@@ -179,23 +177,28 @@ def test_a_failure_says_whose_it_is_and_when():
     structure, contacts, _, at = CASES["rigid"]
     model = mp.MultiPhiModel(structure, contacts, modes="all")
     motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
-    exact = ExactMotion(motion, motion.levels, "body 'beam'", 0.0)
+    exact = ExactMotion(motion.levels, "body 'beam'", 0.0)
     exact.set_forces(held(model, structure.row(at), math.nan), None)
     with pytest.raises(mp.MultiPhiError, match=r"body 'beam': at t = 0\.5 s: the motion is not finite"):
         exact.advance(motion.static_state, 0.5, T_END)
 
 
-def test_plain_functions_do_the_same(monkeypatch):
+def test_a_level_that_cannot_be_made_ends_a_step_at_its_start():
     structure, contacts, force, at = CASES["rigid"]
-    found = []
-    for plain in (False, True):
-        model = mp.MultiPhiModel(structure, contacts, modes="all")
-        if plain:
-            monkeypatch.setattr(carry, "_native", carry.plain)
-        motion = Run(model, 2.0, None, np.full(structure.n, -1.0)).begun()
-        exact = ExactMotion(motion, motion.levels, "body", 0.0)
-        exact.set_forces(held(model, structure.row(at), force), None)
-        found.append((exact, exact.advance(motion.static_state, 0.0, 2.0).state))
-    (one, ours), (other, theirs) = found
-    assert [event.time for event in one.events] == pytest.approx([event.time for event in other.events])
-    np.testing.assert_allclose(ours.displacement, theirs.displacement, rtol=1e-12)
+    model = mp.MultiPhiModel(structure, contacts, modes="all")
+    motion = Run(model, T_END, None, np.full(structure.n, -1.0)).begun()
+    exact = ExactMotion(motion.levels, "body 'beam'", 0.0)
+    exact.set_forces(held(model, structure.row(at), force), None)
+    end = exact.advance(motion.static_state, 0.0, 2.0)
+    times = [event.time for event in exact.events]
+
+    def fails(states):
+        raise mp.MultiPhiError("no such level")
+
+    exact.set_forces(fails, None)
+    with pytest.raises(mp.MultiPhiError, match=r"body 'beam': at t = 2 s: no such level"):
+        exact.advance(end.state, 2.0, 3.0)
+    assert [event.time for event in exact.events] == times
+    exact.set_forces(held(model, structure.row(at), force), None)
+    exact.advance(end.state, 2.0, T_END)
+    assert len(exact.events) > len(times) > 0

@@ -15,7 +15,6 @@ from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 from multiphi_exudyn.exudyn_plugin.body.ahead.run_ahead import RunAhead
 from multiphi_exudyn.exudyn_plugin.body.ahead.undisturbed_steps import UndisturbedSteps
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.time.run.motion import carry
 from reference_models.solver_settings import fixed_steps
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")
@@ -125,15 +124,6 @@ def test_a_function_of_the_user_changes_the_way_and_not_the_answer(kind):
     assert np.max(np.abs(first.points["m1"] - second.points["m1"])) < 1e-7
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_without_the_compiled_loop_it_is_the_same(kind, monkeypatch):
-    monkeypatch.setattr(carry, "_native", carry.plain)
-    model = model_of(KINDS[kind])
-    native, found = mp.simulate(model, T_END, velocity=VELOCITY), System(model, matchedStepSize=STEP).solve()
-    assert same_events(found.events, native.events)
-    assert np.max(distances(found, native)) < 1e-9
-
-
 def test_it_is_asked_at_events_only(monkeypatch):
     asked, arrive = [], RunAhead.after_step
 
@@ -166,8 +156,8 @@ def test_a_failure_on_the_way_is_told_when_exudyn_gets_there(monkeypatch):
     model = model_of(50.0)
     native = mp.simulate(model, T_END, velocity=VELOCITY)
     system = System(model, matchedStepSize=STEP)
-    monkeypatch.setattr("multiphi_exudyn.time.loop.chatter.CHATTER_WINDOW", 4)
-    monkeypatch.setattr("multiphi_exudyn.time.loop.chatter.EVENTS_PER_PERIOD", 0.01)
+    monkeypatch.setattr("multiphi_exudyn.time.run.chatter.CHATTER_WINDOW", 4)
+    monkeypatch.setattr("multiphi_exudyn.time.run.chatter.EVENTS_PER_PERIOD", 0.01)
     model.entries.clear()  # what it has kept of the check
     with pytest.raises(mp.MultiPhiError, match=r"body 'body': at t = .* chatter"):
         system.solve()

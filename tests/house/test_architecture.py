@@ -18,7 +18,6 @@ from posix_modules import POSIX
 
 ROOT = Path(__file__).parents[2]
 BESIDE = ("reference_models", "exudyn_plugin")  # a package beside the house, and the room after which it stands
-COMPILERS = tuple(f"multiphi_exudyn/mathematics/compiling/{name}.py" for name in ("translation", "machine_code"))
 HEAVY = {
     "exudyn": ("multiphi_exudyn/exudyn_plugin", "reference_models"),
     "matplotlib": (
@@ -29,18 +28,13 @@ HEAVY = {
         "multiphi_exudyn/time/trajectory/histories.py",
     ),
     "pandas": ("multiphi_exudyn/study", "multiphi_exudyn/time/trajectory/histories.py"),
-    "numba": COMPILERS,
-    "llvmlite": COMPILERS,
     "distributed": ("multiphi_exudyn/study/sweep",),
     "tqdm": (*(f"multiphi_exudyn/{room}" for room in ("mathematics", "time", "study", "cli")), "reference_models"),
     "h5py": ("multiphi_exudyn/mechanics/files/array_files.py",),
     "pyyeti": ("multiphi_exudyn/mechanics/files/array_files.py",),
 }
+CORE = "multiphi_exudyn._core"
 GUARDED = {"multiphi_exudyn/study/sweep/executors.py": {"fcntl"}}  # behind `if sys.platform == "linux"`
-WITH_NUMBA = (  # may be imported inside a function, as numba may
-    "multiphi_exudyn.mathematics.compiling.compilation",
-    "multiphi_exudyn.mathematics.compiling.machine_code",
-)
 LATE = (  # load what they name when it is asked for: a command's own module, the public names
     "multiphi_exudyn.cli.main",
     "multiphi_exudyn",
@@ -48,7 +42,9 @@ LATE = (  # load what they name when it is asked for: a command's own module, th
 
 
 def sources() -> list[Path]:
-    return sorted([*ROOT.glob("multiphi_exudyn/**/*.py"), *ROOT.glob("reference_models/*.py")])
+    """Every Python file of the house; ``core`` is C++, and what pip calls to compile it."""
+    ours = [*ROOT.glob("multiphi_exudyn/**/*.py"), *ROOT.glob("reference_models/*.py")]
+    return sorted(path for path in ours if path.parts[len(ROOT.parts) + 1] != "core")
 
 
 def module_name(path: Path) -> str:
@@ -97,8 +93,9 @@ def imported(node: ast.AST) -> Iterator[str]:
 
 @functools.cache
 def imports_of(path: Path) -> frozenset[str]:
-    """Full names of all that a file imports."""
-    return frozenset(name for node in importing(tree(path)) for name in imported(node))
+    """Full names of all that a file imports but for the core, which stands before all rooms and imports nothing."""
+    names = frozenset(name for node in importing(tree(path)) for name in imported(node))
+    return frozenset(name for name in names if not name.startswith(CORE))
 
 
 def module_of(name: str) -> str | None:
@@ -205,11 +202,11 @@ def test_nothing_light_is_imported_inside_a_function():
         for function in ast.walk(tree(NAMES[module])):
             if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef)):
                 names = {name for node in importing(function) for name in imported(node)}
-                light = {name for name in names if name.split(".")[0] not in HEAVY and not name.startswith(WITH_NUMBA)}
+                light = {name for name in names if name.split(".")[0] not in HEAVY}
                 assert not light, f"{module}: {function.name} imports {light}"
 
 
-HEAVY_FOR_A_USER = {"exudyn", "matplotlib", "numba", "pandas", "pydantic", "tqdm"}
+HEAVY_FOR_A_USER = {"exudyn", "matplotlib", "pandas", "pydantic", "tqdm"}
 
 
 def test_importing_the_package_loads_nothing_heavy():

@@ -244,7 +244,6 @@ def test_what_is_negative_is_refused(argument):
         (lambda x: run(loads=x), [("tip", 1.0)]),
         (lambda x: run(loads=x), [mp.ConstantLoad("nowhere", 1.0)]),
         (lambda x: run(loads=x), [mp.ConstantLoad(None, 1.0)]),
-        (lambda x: run(compiled=x), "yes"),
         (lambda x: run().gap(x, 0.0), "nowhere"),
         (lambda x: run().at(x, 0.0), "nowhere"),
         (lambda x: run().displacement(0.0, x), "middle"),

@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[2]
 READMES = ["README.md", "examples/README.md", "multiphi_exudyn/README.md", "reference_models/README.md"]
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
+HEADER = re.compile(r"`(core/[a-z_/]+\.hpp)`")
 PLACE = re.compile(r"`([a-z_]+)(?:\.([A-Za-z_.]+))?`")
 LONGEST = 150  # lines of the front page
 
@@ -84,8 +85,11 @@ def modules() -> dict[str, list[object]]:
 def test_the_places_of_the_methods_tables_are_there():
     page = text("multiphi_exudyn/README.md")
     rows = [line for line in page.splitlines() if line.startswith("|") and line.count("|") == 4]
+    headers = [header for row in rows for header in HEADER.findall(row.split("|")[3])]
+    assert len(headers) > 10
+    assert [header for header in headers if not (ROOT / "multiphi_exudyn" / header).exists()] == []
     places = [place for row in rows for place in PLACE.findall(row.split("|")[3])]
-    assert len(places) > 20
+    assert len(places) > 15
     known = modules()
     for module, path in places:
         assert module in known, module

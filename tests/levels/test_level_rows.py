@@ -1,4 +1,4 @@
-"""Rows of a level: gaps, damping and contact forces of its modes, compiled and plain, beside NumPy's least squares."""
+"""Rows of a level: gaps, damping and contact forces of its modes, beside NumPy's least squares."""
 
 import math
 
@@ -7,15 +7,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.packing import level_records
-from multiphi_exudyn.events.packing.level_arrays import LevelArrays
-from multiphi_exudyn.events.transitions import defect_forms, exits
+from multiphi_exudyn.events.transitions.defect_forms import defect_form
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.levels.level import level_rows, static_response
+from multiphi_exudyn.events.transitions.transition import Transition
 from multiphi_exudyn.levels.level.build_level import build_level
-from multiphi_exudyn.mathematics import orthonormal
-from multiphi_exudyn.mathematics.eigenproblems import modes
-from multiphi_exudyn.mathematics.response import free_response
 from multiphi_exudyn.mathematics.round_off import ZERO
 
 DAMPINGS = [mp.RayleighDamping(0.5, 1e-5), mp.ModalDamping(0.01)]
@@ -64,51 +59,11 @@ def test_a_rigid_contact_holds_the_gap_of_its_twin_and_of_what_others_span():
     assert not base.independent([0, 2, 5])
 
 
-ENTRIES = [
-    (level_rows, "fill_rows"),
-    (orthonormal, "span"),
-    (static_response, "write_gaps"),
-    (static_response, "single_response"),
-    (modes, "set_signs"),
-    (orthonormal, "largest_error"),
-    (orthonormal, "remove_from"),
-    (free_response, "write_closed_form"),
-    (level_records, "write_record"),
-    (exits, "fill_signals"),
-    (defect_forms, "write_motions"),
-    (defect_forms, "copy_triangles"),
-]
-
-
-def packed(closed):
-    """All buffers after a level, the map to it and its powers are packed."""
-    made = model()
-    arrays = LevelArrays(LoadedLevels.static(made, np.ones(made.base.modes.count)))
-    states = [int(i in closed) for i in range(len(made.contacts))]
-    new, old = arrays.level(states), arrays.level([0] * len(states))
-    arrays._add_map(old, new)
-    arrays.add_powers(new)
-    return [each.copy() for each in arrays.buffers.all]
-
-
-@pytest.mark.parametrize("closed", SETS)
-def test_plain_python_packs_what_compiled_functions_do(monkeypatch, closed):
-    compiled = packed(closed)
-    for module, entry in ENTRIES:
-        monkeypatch.setattr(module, entry, getattr(module, entry).plain)
-    ints, numbers, waves = packed(closed)
-    assert_array_equal(ints, compiled[0])
-    for own, other in ((numbers, compiled[1]), (waves, compiled[2])):
-        assert_allclose(own, other, rtol=1e-9, atol=1e-12 * np.max(np.abs(own[np.isfinite(own)])))
-
-
 def test_a_struck_contact_that_closed_ones_hold_takes_no_further_motion():
     made = model()
     between = mp.UnilateralContact("between", {"p0": 0.6, "p2": 0.8}, 1e-3, math.inf)
     made = mp.MultiPhiModel(made.structure, [*made.contacts, between], modes=9)
     levels = LoadedLevels.static(made, np.ones(made.base.modes.count))
-    entered = levels.transition(levels.level((0,) * 7), levels.level((1, 0, 1, *(0,) * 4)))
-    alone, struck = (defect_forms.defect_form(entered, stopped).factors for stopped in ((), (6,)))
-    size = 1 + sum(entered.matrix.shape)
-    forms = [moving.T @ moving for moving in (f[size**2 :].reshape(size - 1, size - 1) for f in (alone, struck))]
-    assert_allclose(forms[1], forms[0], rtol=0, atol=1e-12 * np.max(forms[0]))
+    entered = Transition(levels.level((0,) * 7), levels.level((1, 0, 1, *(0,) * 4)))
+    alone, struck = (defect_form(entered, stopped).moving for stopped in ((), (6,)))
+    assert_allclose(struck.T @ struck, alone.T @ alone, rtol=0, atol=1e-12 * np.max(alone.T @ alone))

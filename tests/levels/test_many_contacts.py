@@ -209,7 +209,7 @@ def test_a_hundred_stops_run_to_the_end_with_certified_events():
 
 def test_a_bed_struck_all_at_once_is_no_chatter(monkeypatch):
     """One change of every stop within a small part of a period of the highest kept mode."""
-    monkeypatch.setattr("multiphi_exudyn.time.loop.chatter.CHATTER_WINDOW", 10)
+    monkeypatch.setattr("multiphi_exudyn.time.run.chatter.CHATTER_WINDOW", 10)
     model = bed(1e7, n=200, stops=60)
     mode = model.level(()).shapes[:, 0]
     fall = -3.0 * mode / np.abs(mode).max() * np.sign(mode[len(mode) // 2])

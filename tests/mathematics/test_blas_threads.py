@@ -7,8 +7,8 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.packing.level_arrays import LevelArrays
 from multiphi_exudyn.mathematics.blas_threads import one_blas_thread
+from multiphi_exudyn.time import core_levels
 
 
 def threads():
@@ -51,12 +51,12 @@ class TestOneThread:
         assert threads() == {2}
 
     def test_holds_while_levels_are_built(self, monkeypatch):
-        seen, build = [], LevelArrays.level
-        monkeypatch.setattr(LevelArrays, "level", lambda self, key: (seen.append(threads()), build(self, key))[1])
+        seen, build = [], core_levels.level_data
+        monkeypatch.setattr(core_levels, "level_data", lambda level: (seen.append(threads()), build(level))[1])
         stiffness = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])
         chain = mp.LinearStructure(np.eye(3), stiffness, points={"tip": 2})
         model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
         run = mp.simulate(model, 0.5, velocity=-np.ones(3))
         assert run.events
-        assert seen[-1] == {1}  # what the loop asked for
+        assert seen[-1] == {1}  # what the core asked for
         assert threads() == {2}

@@ -24,7 +24,7 @@ MEMORY = {
     "bed-of-stops": 70e6,
     "rubbing-stop": 12e6,
 }  # bytes at most; 8 MB for all others, of the loop's code and record
-PACKAGES = {"llvmlite", "numpy", "scipy"}  # llvmlite loads the loop; numpy may bring others
+PACKAGES = {"numpy", "scipy"}  # numpy may bring others
 HEAVY = {"exudyn", "jinja2", "matplotlib", "numba", "pandas", "pydantic"}
 MOST_MODULES = 207  # of this package, whose core has no more files and rooms; nothing of study, plugin or command line
 T_END = {"bed-of-stops": 0.08}  # s, of a run that takes seconds

@@ -14,7 +14,7 @@ from multiphi_exudyn import (
 )
 from multiphi_exudyn.mechanics.structures.structure import damping_matrix
 from multiphi_exudyn.study.measures.metrics import nrmse
-from multiphi_exudyn.study.running import reduced_runner, runner, timing
+from multiphi_exudyn.study.running import runner, timing
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.timing import in_turns, repeated, undisturbed
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
@@ -272,19 +272,3 @@ def test_a_first_run_that_builds_levels_is_no_measure_of_a_repeat(setup, monkeyp
     monkeypatch.setattr(runner, "repeated", lambda run, first, fewest: told.append(first) or ())
     run_model(setup, name)
     assert (told[0] > 0) == counts
-
-
-def test_the_loop_is_compiled_before_the_clock_starts(setup, monkeypatch):
-    called = []
-    for module, name in ((runner, "compile_entries"), (reduced_runner, "simulate")):
-        function = getattr(module, name)
-
-        def told(*given, name=name, function=function, **options):
-            called.append(name)
-            return function(*given, **options)
-
-        monkeypatch.setattr(module, name, told)
-    name = next(name for name, spec in setup.scene.models.items() if spec.kind == "reduced")
-    run_model(setup, name, progress=False)
-    assert called[:2] == ["compile_entries", "simulate"]
-    assert called.count("compile_entries") == 1

@@ -9,8 +9,9 @@ from numpy.testing import assert_allclose
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.transitions.defect_forms import struck_defects
+from multiphi_exudyn.events.excitation.excitation import Excitation
+from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
+from multiphi_exudyn.time.core_levels import core_levels
 from multiphi_exudyn.time.reliability.defects import defects, total_defect
 from multiphi_exudyn.time.segments.segment import as_segments
 from multiphi_exudyn.time.simulate import Run
@@ -102,41 +103,14 @@ def test_what_the_loop_adds_up_is_the_definition(kind):
     run, known, struck = Run(model, END, **start).begun(), 0, 0
     for instant, expected in exact.items():
         run.advance(float(instant) * (1 - 1e-9))
-        run.arrays.numbers[a.DEFECTS] = 0.0
+        run._run.defects = 0.0
         run.advance(float(instant) * (1 + 1e-9))
-        added = run.arrays.numbers[a.DEFECTS]
+        added = run._run.defects
         if not math.isnan(added):
             assert_allclose(added, expected, rtol=1e-9, atol=1e-12 * max(exact.values()))
             known, struck = known + 1, struck + (instant in impacts)
     assert known > 5
     assert struck > 0 or not impacts
-
-
-def entered(run):
-    """The maps of a run from level to level: (record, n of the level left, n of the level entered)."""
-    arrays = run.arrays
-    found = [(record, *ends) for ends, record in arrays._maps.items() if ends[0] != arrays.base]
-    return [(record, *(int(arrays.ints[level + a.MODES]) for level in ends)) for record, *ends in found]
-
-
-def test_where_one_map_made_the_state_after_only_the_state_before_is_looked_at():
-    """The rest of the factors is not read: it may be anything."""
-    model = mp.MultiPhiModel(chain(7), [mp.UnilateralContact("stop", "m5", 0.05, 20.0)], modes=3)
-    runs = [Run(model, END, velocity=-np.linspace(0.1, 0.4, 7)).begun() for _ in range(2)]
-    runs[0].advance(END)
-    numbers, ints = runs[0].arrays.numbers, runs[0].arrays.ints
-    expected = numbers[a.DEFECTS]
-    for record, n, n_after in entered(runs[0]):
-        place = int(ints[record + a.MAP_DEFECT])
-        for constants in (1, 0):
-            width = constants + n + n_after
-            factor = numbers[place : place + width * width].reshape(width, width)
-            factor[constants + n :] = math.nan
-            factor[:, constants + n :] = math.nan
-            place += factor.size
-    runs[1].advance(END)
-    assert runs[1].arrays is runs[0].arrays
-    assert numbers[a.DEFECTS] == expected > 0
 
 
 @pytest.mark.parametrize("seed", [3, 13, 15])
@@ -150,20 +124,11 @@ def test_a_start_that_sticks_is_left_to_those_who_look_at_all_modes(seed):
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
-def test_what_a_struck_contact_removes_is_packed_where_one_opens_again(restitution):
-    """At its first bounce, and then the sum is that of a run whose levels had it before."""
+def test_what_a_struck_contact_removes_is_added_where_one_opens_again(restitution):
     stop = mp.UnilateralContact("stop", "m5", 0.05, restitution=restitution)
-    model, start = mp.MultiPhiModel(chain(7), [stop], modes=3), {"velocity": -np.linspace(0.1, 0.4, 7)}
-    sums = []
-    for _ in range(2):
-        run = Run(model, END, **start).begun()
-        packed = [int(run.arrays.ints[record + a.STRUCK_DEFECTS]) for record in run.arrays._tables.levels]
-        assert any(packed) == bool(sums)
-        run.advance(END)
-        sums.append(float(run.arrays.numbers[a.DEFECTS]))
-    exact = sum(defect.size**2 for defect in defects(simulated(model, END, **start)))
-    assert sums[0] == sums[1]
-    assert_allclose(sums[0], exact, rtol=1e-9)
+    run = simulated(mp.MultiPhiModel(chain(7), [stop], modes=3), END, velocity=-np.linspace(0.1, 0.4, 7))
+    exact = sum(defect.size**2 for defect in defects(run))
+    assert_allclose(run.segments.defects, exact, rtol=1e-9)
 
 
 def test_what_an_impulse_leaves_out_is_the_same_under_a_load_that_varies():
@@ -171,8 +136,8 @@ def test_what_an_impulse_leaves_out_is_the_same_under_a_load_that_varies():
     stops = [mp.UnilateralContact(f"stop{k}", f"m{k}", 0.02) for k in (2, 4)]
     model = mp.MultiPhiModel(chain(7), stops, modes=3)
     load = mp.SampledLoad("m1", [0.0, 0.5, 1.0], [0.0, 1.0, -1.0])
-    run = simulated(model, 1.0, displacement=np.full(7, -0.01), loads=[load])
-    level = run.segments[0].level
-    assert level.level.modes > level.modal.modes == 3
-    assert_allclose(struck_defects(level), struck_defects(level.alone), rtol=1e-12)
-    assert np.all(struck_defects(level) > 0)
+    levels = LoadedLevels.under(model, Excitation.of(model, [load], 1.0), 0.0, 1.0)
+    loaded, alone = (core_levels(each).level((0, 0)) for each in (levels, levels.alone))
+    assert loaded.channels > alone.channels == 0
+    assert_allclose(loaded.struck_defects, alone.struck_defects, rtol=1e-12)
+    assert np.all(loaded.struck_defects > 0)

@@ -105,9 +105,8 @@ class TestBelt:
     period = 1.3424777960769378
 
     @pytest.mark.parametrize("speed", [0.3, -0.3])
-    @pytest.mark.parametrize("compiled", [True, False])
-    def test_has_its_period(self, speed, compiled):
-        run = mp.simulate(belt(speed), 12.0, compiled=compiled)
+    def test_has_its_period(self, speed):
+        run = mp.simulate(belt(speed), 12.0)
         slips = [event.time for event in run.events if event.kind == "slip"]
         assert len(slips) == 9
         assert_allclose(np.diff(slips), self.period, rtol=1e-13)

@@ -1,22 +1,18 @@
 """Many runs at once are each what they are alone, to the bit, however many threads there are."""
 
-import dataclasses
 import math
 import threading
-import time
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 from small_structures import bed, chain, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.packing.level_arrays import LevelArrays
-from multiphi_exudyn.mathematics.compiling.compiled import available
-from multiphi_exudyn.time.many import batch, workers
+import multiphi_exudyn._core as core
+from multiphi_exudyn.time.many import workers
+from multiphi_exudyn.time.run import chatter
 from multiphi_exudyn.time.run.motion import Motion
-from multiphi_exudyn.time.run.start import first_start
-from multiphi_exudyn.time.simulate import Run
 from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
 END = 6.0
@@ -53,23 +49,6 @@ def check(found, runs, points):
             assert_array_equal(found.samples[k, p], run.at(point, TIMES))
 
 
-def begun(given, displacements):
-    """The levels of runs from some displacements, and their starts."""
-    levels = Run(given, END).levels()
-    return levels, [first_start(levels, END, x, None) for x in displacements]
-
-
-def carried(arrays, starts, is_summing_works=True):
-    """These starts carried to the end together, on arrays whose levels are packed."""
-    for start in starts:
-        motion = Motion(arrays, start)
-        motion.is_summing_works = is_summing_works
-        motion.advance(END)
-    motion = Motion(arrays, starts[0])
-    motion.is_summing_works = is_summing_works
-    return batch.Batch.run(motion, starts, END, lambda function, *given: function(*given))
-
-
 LOADS = {
     "none": (),
     "constant": (mp.ConstantLoad("m3", 0.2),),
@@ -91,7 +70,7 @@ LOADS = {
     ],
 )
 def test_are_those_of_simulate_to_the_bit(loads, stiffness, count):
-    """The first ones find levels that are not packed, and are run alone; later ones in batches, not under functions."""
+    """The first one is run alone, as are all under functions; the others in batches."""
     points = ("m5", {"m0": 1.0, "m2": -2.0}, np.eye(6)[4])
     given, x = LOADS[loads], starts(count)
     runs = alone(model(stiffness=stiffness), x, loads=given)
@@ -125,15 +104,12 @@ def test_a_tolerance_is_decided_by_the_first_run():
     assert second.decided.modes == first.decided.modes
 
 
-@pytest.mark.parametrize("known", [True, False], ids=["compiled", "plain Python"])
-def test_there_are_as_many_threads_as_cores_where_the_loop_is_compiled(known, monkeypatch):
-    monkeypatch.setattr("multiphi_exudyn.time.many.many.available", lambda: known)
+def test_there_are_as_many_threads_as_cores(monkeypatch):
     monkeypatch.setattr("os.cpu_count", lambda: 3)
-    pools = []
-    pool = workers.ThreadPoolExecutor
-    monkeypatch.setattr(workers, "ThreadPoolExecutor", lambda threads: pools.append(threads) or pool(threads))
+    threads, run_batch = [], core.run_batch
+    monkeypatch.setattr(core, "run_batch", lambda *given: threads.append(given[-1]) or run_batch(*given))
     mp.simulate_many(model("all"), END, starts(4))
-    assert pools == [3 if known else 1]
+    assert threads == [3]
 
 
 @pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
@@ -142,14 +118,16 @@ class TestSeveralRunsTogether:
 
     @pytest.fixture
     def calls(self, monkeypatch):
-        """(Of several runs, by one call: how many came to their ends; of one run)."""
-        together, single = [], []
-        advance_batch, carry = batch.advance_batch, workers.carry
-        monkeypatch.setattr(
-            batch, "advance_batch", lambda *given: together.append(advance_batch(*given)) or together[-1]
-        )
-        monkeypatch.setattr(workers, "carry", lambda *given: single.append(1) or carry(*given))
-        return together, single
+        """Of every batch, how many runs came to their ends."""
+        together, run_batch = [], core.run_batch
+
+        def counted(*given):
+            runs = run_batch(*given)
+            together.append(sum(run.is_complete for run in runs))
+            return runs
+
+        monkeypatch.setattr(core, "run_batch", counted)
+        return together
 
     @pytest.mark.parametrize("loads", ["none", "harmonic"])
     @pytest.mark.parametrize(("modes", "stiffness"), [(4, 50.0), (3, math.inf), ("all", 50.0)])
@@ -162,15 +140,13 @@ class TestSeveralRunsTogether:
                 model(modes, stiffness=stiffness), END, x, loads=given, points=points, times=TIMES, threads=threads
             )
             check(found, runs, points)
-        assert sum(calls[0]) > 20
+        assert sum(calls) > 20
 
     @pytest.mark.parametrize("threads", [1, 3])
-    def test_few_calls_of_the_loop(self, threads, calls):
+    def test_in_few_batches(self, threads, calls):
         mp.simulate_many(model("all"), END, starts(200, most=0.11), threads=threads)
-        together, single = calls
-        assert sum(together) > 150
-        assert len(together) < 30 * threads
-        assert len(single) < 30 * threads
+        assert sum(calls) == 199
+        assert len(calls) <= 199 // (workers.BATCH * threads) + 1
 
     def test_one_that_stops_is_carried_by_itself(self, calls):
         """Inside a stop, or not finite, at its start; others go on together."""
@@ -182,7 +158,7 @@ class TestSeveralRunsTogether:
         assert found.status == ("ok",) * 11 + ("failed",) + ("ok",) * 18
         assert_array_equal(np.delete(found.events, 11), [len(run.events) for run in runs])
         assert_array_equal(np.delete(found.samples[:, 0], 11, axis=0), [run.at("m5", TIMES) for run in runs])
-        assert sum(calls[0]) > 15
+        assert sum(calls) > 15
 
     def test_one_pressed_against_a_rigid_contact_at_its_start(self, calls):
         """Its numbers do not tell what its first level leaves out of it; the run as a whole does."""
@@ -190,29 +166,15 @@ class TestSeveralRunsTogether:
         x[::2], x[::2, 5] = np.linspace(0, -0.1, 6), -0.1
         runs = alone(model(3), x, loads=loads)
         check(mp.simulate_many(model(3), END, x, loads=loads, points=["m5"], times=TIMES, threads=1), runs, ["m5"])
-        assert sum(calls[0]) > 15
+        assert sum(calls) > 15
 
-    def test_a_full_record_ends_a_call(self):
-        own = model("all")
-        for x in starts(3, most=0.11):
-            mp.simulate(own, END, displacement=x)  # packs the levels
-        levels, given = begun(own, starts(3, most=0.11))
-        whole = carried(LevelArrays(levels), given)
-        arrays = LevelArrays(levels)
-        arrays.room = int(whole.ends[2, 0]) - 1
-        short = carried(arrays, given)
-        assert (whole.count, short.count) == (3, 1)
-        assert_array_equal(short.ends[:2], whole.ends[:2])
-        for name, values in short.parts.items():
-            assert_array_equal(values, whole.parts[name][: len(values)])
-
-    def test_decisions_of_one_run_are_no_chatter_of_the_next(self, monkeypatch):
-        """A window of the check that reached back into another run would have no time in it, and end the call."""
-        monkeypatch.setattr("multiphi_exudyn.time.loop.chatter.CHATTER_WINDOW", 1)
-        levels, given = begun(model("all", stiffness=50.0), starts(5))
-        together = carried(LevelArrays(levels), given)
-        assert together.count == 5
-        assert np.all(together.events > 2)
+    def test_decisions_of_one_run_are_no_chatter_of_the_next(self, monkeypatch, calls):
+        """A window of the check that reached back into another run would have no time in it."""
+        monkeypatch.setattr(chatter, "CHATTER_WINDOW", 1)
+        found = mp.simulate_many(model("all", stiffness=50.0), END, starts(5), threads=1)
+        assert found.status == ("ok",) * 5
+        assert calls == [4]
+        assert np.all(found.events > 2)
 
     def test_with_friction(self, calls):
         """States, held places and warnings of friction are of each run."""
@@ -226,26 +188,21 @@ class TestSeveralRunsTogether:
         check(mp.simulate_many(given[1], END, x, points=["m5"], times=TIMES, threads=2), runs, ["m5"])
         assert sum(len(run.events) for run in runs) > 100
 
-    @pytest.mark.parametrize("is_summing_works", [True, False])
-    def test_motions_are_whole(self, is_summing_works):
-        """A landed motion is that of a run alone: its segments, events, final state, energies and statistics."""
-        own = model(4, stiffness=50.0)
+    def test_motions_are_whole(self, monkeypatch):
+        """A run of a batch is that of a run alone: its segments, events, final state, energies and statistics."""
+        own, found_all, ended = model(4, stiffness=50.0), [], Motion.ended
+        monkeypatch.setattr(workers.Motion, "ended", lambda *given: found_all.append(ended(*given)) or found_all[-1])
         with kept_back():
-            runs = [mp.simulate(own, END, displacement=x) for x in starts(3, most=0.11)]
-            levels, given = begun(own, starts(3, most=0.11))
-            found_all = carried(LevelArrays(levels), given, is_summing_works)
-        assert found_all.count == 3
-        for k, run in enumerate(runs):
-            found = found_all.motion(k).trajectory(END)
+            runs = [mp.simulate(own, END, displacement=x) for x in starts(4, most=0.11)]
+            mp.simulate_many(own, END, starts(4, most=0.11), threads=2)
+        assert len(found_all) == 3
+        for motion, run in zip(found_all, runs[1:], strict=True):
+            found = motion.trajectory(END)
             assert [(s.start, s.end, s.phases) for s in found.segments] == [
                 (s.start, s.end, s.phases) for s in run.segments
             ]
             assert list(found.events) == list(run.events)
-            if is_summing_works:
-                assert found.ledger == run.ledger
-            else:  # works that are integrated afterwards have another round-off
-                integrated, summed = dataclasses.astuple(found.ledger), dataclasses.astuple(run.ledger)
-                assert_allclose(integrated, summed, rtol=0, atol=1e-14 * run.ledger.initial)
+            assert found.ledger == run.ledger
             assert found.start_loss == run.start_loss
             assert_array_equal(found.final.displacement, run.final.displacement)
             assert_array_equal(found.final.velocity, run.final.velocity)
@@ -279,30 +236,11 @@ class TestARunThatFails:
         assert len(kinds) == len(set(kinds))
 
 
-@pytest.mark.skipif(not available(), reason="plain Python holds the interpreter's lock")
-def test_threads_are_in_the_loop_at_the_same_time(monkeypatch):
-    """Each waits in the loop until all are there, which would never be if it kept the others out."""
-    here, carry = threading.Barrier(3, timeout=60), workers.carry
-    waited = []
-
-    def waiting(*given):
-        if len(waited) < 3:
-            waited.append(1)
-            here.wait()
-        return carry(*given)
-
-    monkeypatch.setattr(workers, "carry", waiting)
-    found = mp.simulate_many(model("all"), END, starts(3), threads=3)
-    assert found.status == ("ok",) * 3
-    assert not here.broken
-
-
 def test_an_error_that_is_nobodys_ends_all(monkeypatch):
     def broken(*_):
-        time.sleep(0.01)
         raise RuntimeError("a fault of the program")
 
-    monkeypatch.setattr(workers, "carry", broken)
+    monkeypatch.setattr(core, "run_batch", broken)
     with pytest.raises(RuntimeError, match="a fault of the program"):
         mp.simulate_many(model("all"), END, starts(50), threads=2)
 

@@ -1,4 +1,4 @@
-"""States of many segments of a run at once: those that each segment has in closed form, whoever has the arrays."""
+"""States of many segments of a run at once: those that each segment has in closed form."""
 
 import math
 import pickle
@@ -9,9 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.packing import level_arrays
-from multiphi_exudyn.time.loop.motion_size import SAMPLES
-from multiphi_exudyn.time.record import record
+import multiphi_exudyn._core as core
 from multiphi_exudyn.time.segments import segment
 from multiphi_exudyn.time.simulate import Run
 
@@ -65,10 +63,10 @@ def test_states_of_many_segments_together_are_those_of_each(loads, damping):
 
 @pytest.mark.parametrize("loads", LOADS.values(), ids=LOADS)
 def test_the_sizes_of_a_motion_are_those_of_its_displacements_and_energies(loads):
-    """By the compiled flow, by single segments, and by the displacements of the structure in the norm of its mass."""
+    """By the core, by single segments, and by the displacements of the structure in the norm of its mass."""
     run = mp.simulate(model(mp.ModalDamping([0.02, 0.01, 0.03])), 5.0, displacement=START, loads=loads)
     found = segment.as_segments(run.segments).sizes(4.9)
-    times = np.linspace(0.0, 4.9, SAMPLES)
+    times = np.linspace(0.0, 4.9, core.MOTION_SAMPLES)
     x = run.displacement(times)
     squares = np.sum(x * (run.model.structure.mass @ x), axis=0)
     expected = np.mean(squares[1:] + squares[:-1]) / 2, np.max(np.abs(run.energy(times)))
@@ -78,7 +76,7 @@ def test_the_sizes_of_a_motion_are_those_of_its_displacements_and_energies(loads
 
 def test_pieces_of_a_harmonic_so_short_that_it_is_a_polynomial_there():
     """Its powers have shapes of their own."""
-    run = mp.simulate(model(mp.ModalDamping([0.02, 0.01, 0.03])), 5.0, loads=LOADS["harmonic"])
+    run = mp.simulate(model(mp.ModalDamping([0.02, 0.01, 0.03])), 0.5, loads=LOADS["harmonic"])
     assert any(not each.basis.pure for each in run.segments)
     assert_states_of_segments(run)
 
@@ -134,7 +132,7 @@ class TestPlacesGapsAndForces:
             assert left[k] == pytest.approx(before.force(0, times[k : k + 1])[0], abs=1e-10)
 
 
-class TestWhateverHappensToTheArraysOfTheLoop:
+class TestWhateverHappensToTheRun:
     @pytest.fixture(params=["constant", "harmonic", "samples"])
     def loads(self, request):
         return LOADS[request.param]
@@ -158,20 +156,6 @@ class TestWhateverHappensToTheArraysOfTheLoop:
         mp.simulate(own, 5.0, displacement=2 * START, loads=loads)
         assert_array_equal(self.asked(run), expected)
 
-    def test_arrays_that_have_begun_anew_do_not_matter(self, loads):
-        run = mp.simulate(model(), 5.0, displacement=START, loads=loads)
-        expected = self.asked(run)
-        run.segments.arrays.forget()
-        assert_array_equal(self.asked(run), expected)
-
-    def test_levels_that_do_not_fit_together_are_packed_in_turn(self, loads, monkeypatch):
-        run = mp.simulate(model(), 5.0, displacement=START, loads=loads)
-        expected = self.asked(run)
-        for limit in ("ARRAY_BYTES", "FEWEST_LEVELS"):
-            monkeypatch.setattr(level_arrays, limit, 0)
-        assert_array_equal(self.asked(run), expected)
-        assert len(run.segments.levels) > len(run.segments.arrays.loaded)
-
     def test_a_run_under_way_goes_on_as_if_nobody_had_asked(self, loads):
         def motion():
             return Run(model(), 5.0, START, None, loads).begun()
@@ -184,9 +168,3 @@ class TestWhateverHappensToTheArraysOfTheLoop:
         assert_allclose(
             [e.time for e in twice.trajectory(5.0).events], [e.time for e in once.trajectory(5.0).events], rtol=1e-12
         )
-
-    def test_plain_python_gives_the_same(self, loads, monkeypatch):
-        run = mp.simulate(model(), 5.0, displacement=START, loads=loads)
-        expected = self.asked(run)
-        monkeypatch.setattr(record, "states_of", record.states_of.function)
-        assert_allclose(self.asked(run), expected, rtol=0, atol=1e-13)

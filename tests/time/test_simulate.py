@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mathematics.search import signal_bounds
 from multiphi_exudyn.time.simulate import Run
 from reference_models.rig import rig_beam, rig_contact, rig_damping
 
@@ -61,17 +60,6 @@ class TestTruncationOnTheRig:
         model = dataclasses.replace(rigid.model, modes=modes)
         run = mp.simulate(model, self.END, displacement=pulled(model))
         assert max(nrmse(run, rigid, point, self.END) for point in ("node2", "node3")) < 0.03
-
-    @pytest.mark.parametrize("modes", [6, 12])
-    def test_density_of_samples_changes_nothing(self, modes, monkeypatch):
-        model, runs = rig_model(math.inf, modes), []
-        for refine in (1.0, 10.0):
-            monkeypatch.setattr(signal_bounds, "RESOLUTION", 0.02 / refine**4)
-            runs.append(mp.simulate(model, self.END, displacement=pulled(model), compiled=False))
-        times = [[event.time for event in run.events] for run in runs]
-        assert times[0] == pytest.approx(times[1], abs=1e-10)
-        assert nrmse(runs[0], runs[1], "node3", self.END) < 1e-8
-        assert runs[1].stats.function_evaluations > 1.5 * runs[0].stats.function_evaluations
 
     @pytest.mark.parametrize(("modes", "ceiling"), [(6, 0.03), (8, 0.02), (12, 1e-3), (24, 1e-5)])
     def test_compliant_levels_converge_fast(self, compliant, modes, ceiling):
@@ -288,11 +276,3 @@ class TestWorkOfAStart:
         found, expected = (Run(model, 1.0, x, -x).begun().start for model in (quick, thorough))
         for one, other in zip(dataclasses.astuple(found), dataclasses.astuple(expected), strict=True):
             np.testing.assert_array_equal(one, other)
-
-    def test_nothing_of_a_record_is_sorted_before_somebody_asks(self):
-        model = chain([mp.UnilateralContact("stop", "m3", 0.1)])
-        run = mp.simulate(model, 1e-3, displacement=np.array([0.01, 0.02, 0.03, 0.04]))
-        record = run.segments._record
-        assert (len(run.segments), record.bytes, record._parts) == (1, run.stats.record_bytes, {})
-        assert run.segments[0].end == 1e-3
-        assert record._parts == {}  # what was taken at once is as it was taken

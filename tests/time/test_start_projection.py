@@ -35,28 +35,26 @@ def setting_out(base, near=0.0):
 numbers = st.lists(st.sampled_from([0.0, 1.0, -2.0, 1e-15, 3e-9, 0.1, 1e4]), min_size=N, max_size=N)
 
 
-@pytest.mark.parametrize("compiled", [None, False], ids=["compiled", "plain"])
 @settings(max_examples=50)
 @given(x=numbers, modes=st.sets(st.integers(0, N - 1)), scale=st.sampled_from([1.0, 1e-200, 1e150]))
-def test_coordinates_without_their_round_off(compiled, x, modes, scale):
+def test_coordinates_without_their_round_off(x, modes, scale):
     """Whatever is round-off of its terms is zero, and nothing else, however large the start is."""
     base = model().base
     onto, sizes = base.projection
     x = np.array(x)
     x -= base.modes.shapes[:, sorted(modes)] @ (onto[sorted(modes)] @ x)  # modes that have round-off alone
     x *= scale
-    y, v, _ = setting_out(base).coordinates(x, -x, compiled)
+    y, v, _ = setting_out(base).coordinates(x, -x)
     assert_array_equal(y, drop_round_off(onto @ x, sizes @ np.abs(x)))
     assert_array_equal(v, -y)
-    y, v, far = setting_out(base).coordinates(None, None, compiled)
+    y, v, far = setting_out(base).coordinates(None, None)
     assert far
     assert not np.concatenate([y, v]).any()
 
 
-@pytest.mark.parametrize("compiled", [None, False], ids=["compiled", "plain"])
-def test_numbers_that_overflow_are_not_far(compiled):
+def test_numbers_that_overflow_are_not_far():
     with np.errstate(over="ignore"):
-        assert not setting_out(model().base).coordinates(np.full(N, 1e200), None, compiled)[2]
+        assert not setting_out(model().base).coordinates(np.full(N, 1e200), None)[2]
 
 
 @pytest.mark.parametrize("stiffness", [math.inf, 500.0], ids=["rigid", "compliant"])
@@ -128,5 +126,5 @@ def test_a_start_is_far_by_how_far_it_is_and_where_its_speed_takes_it():
     y, v = base.coordinates(x), base.coordinates(x_t)
     gaps = 1.0 + y @ (base.directions / np.linalg.norm(base.directions, axis=0))
     limit = gaps.min() / (np.linalg.norm(y) + np.linalg.norm(v))
-    assert setting_out(base, 0.999 * limit).coordinates(x, x_t, None)[2]
-    assert not setting_out(base, 1.001 * limit).coordinates(x, x_t, None)[2]
+    assert setting_out(base, 0.999 * limit).coordinates(x, x_t)[2]
+    assert not setting_out(base, 1.001 * limit).coordinates(x, x_t)[2]

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from multiphi_exudyn._core import ModalResponse
 from multiphi_exudyn.display import Shown
 from multiphi_exudyn.events.excitation.channels import Channels
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.level.level import Asymptotic, Level
-from multiphi_exudyn.mathematics.response.free_response import ModalResponse
 
 __all__ = ["LoadedLevel", "PotentialForm", "StrainForm"]
 
@@ -139,6 +139,9 @@ class LoadedLevel(Shown):
             own_states=self.states,
             stored=_stored(self.level.base, self.states),
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {key: value for key, value in vars(self).items() if key != "response"}  # of the core: a copy asks again
 
     @property
     def width(self) -> int:

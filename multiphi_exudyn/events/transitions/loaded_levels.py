@@ -1,4 +1,4 @@
-"""Loaded levels: the levels of one model under the loads of a run, and the maps between them.
+"""Loaded levels: the levels of one model under the loads of a run.
 
 They are built when first used, and kept as long as the model's bound on memory allows.
 """
@@ -15,10 +15,9 @@ import numpy as np
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import State
-from multiphi_exudyn.events.transitions.transition import Transition
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mathematics.search.signal_bounds import power_of_two_above
+from multiphi_exudyn.mathematics.round_off import power_of_two_above
 
 __all__ = ["LoadedLevels"]
 
@@ -31,14 +30,13 @@ T = TypeVar("T")
 
 @dataclass
 class _LevelEntry:
-    """A level with the ``links`` that hold in it, and its maps to other levels by their states.
+    """A level with the ``links`` that hold in it.
 
     further: values derived from the level elsewhere, by their keys.
     """
 
     level: LoadedLevel
     links: tuple[int, ...]
-    ways: dict[tuple[int, ...], Transition] = field(default_factory=dict)
     further: BoundedCache[Hashable, Any] = field(default_factory=lambda: BoundedCache(DERIVED_KEPT))
 
 
@@ -47,8 +45,8 @@ class LoadedLevels:
 
     The key of a level is the state numbers of all elements. alone: the levels under the static loads alone, with held
     displacements as channels, which are kept longer than a run; it is these levels if nothing varies. lasting: the
-    longest duration [s] of a motion. arrays: the loop's arrays of these levels, for later runs (level_arrays.py). held:
-    the same under forces that bodies hold for a step (modal_force.py). starts: values by which starts are judged, by
+    longest duration [s] of a motion. core: the core's levels, for later runs (time/core_levels.py). held:
+    the same under forces that bodies hold for a step (exact_motion.py). starts: values by which starts are judged, by
     the end [s] of their run (simulate.py). told: warnings common to runs in the same levels (run_warnings.py).
     """
 
@@ -66,16 +64,16 @@ class LoadedLevels:
         self.alone = alone or self
         self.lasting = lasting
         self.set_interval(time, until)
-        self.arrays: Any = None
+        self.core: Any = None
         self.held: Any = None
         self.starts = BoundedCache[float, Any](STARTS_KEPT)
         self.told = BoundedCache[Hashable, Any](WARNINGS_KEPT)
-        self._entries = BoundedCache[tuple[int, ...], _LevelEntry](model.most_levels, self._drop_maps_to)
+        self._entries = BoundedCache[tuple[int, ...], _LevelEntry](model.most_levels)
         self._pushed = BoundedCache[tuple[int, ...], LoadedLevel](model.most_levels)
 
     def __getstate__(self) -> dict[str, Any]:
         starts = BoundedCache[float, Any](STARTS_KEPT)
-        return {**vars(self), "arrays": None, "held": None, "starts": starts}  # buffers: a copy makes its own
+        return {**vars(self), "core": None, "held": None, "starts": starts}  # a copy makes its own
 
     @classmethod
     def static(cls, model: MultiPhiModel, load: np.ndarray, lasting: float = math.inf) -> LoadedLevels:
@@ -88,7 +86,7 @@ class LoadedLevels:
     ) -> LoadedLevels:
         """Return levels under an excitation, for motions from a time [s] to an end, of a duration [s] at most.
 
-        The model keeps those under its static loads: the maps between them serve every run.
+        The model keeps those under its static loads: they serve every run.
         """
         load, longest = excitation.static, _longest_motion(model, lasting)
         key = load.tobytes(), longest
@@ -97,19 +95,7 @@ class LoadedLevels:
 
     def set_interval(self, time: float, until: float) -> None:
         """Set the time and end [s] of the motions that follow."""
-        self.drive, self.until = self.excitation.drive(time), until
-
-    @property
-    def kept_arrays(self) -> list[Any]:
-        """The arrays that are kept, including those under held forces."""
-        return [arrays for arrays in (self.arrays, getattr(self.held, "arrays", None)) if arrays is not None]
-
-    def let_go(self, arrays: Any) -> None:
-        """Stop keeping these arrays; a run that works on them still holds them."""
-        if self.arrays is arrays:
-            self.arrays = None
-        else:
-            self.held = None
+        self.drive, self.until, self.core = self.excitation.drive(time), until, None
 
     @property
     def isolated(self) -> bool:
@@ -181,27 +167,10 @@ class LoadedLevels:
         x, v = (np.delete(xi, slice(r, r + places)) for xi in (state.displacement, state.velocity))
         return State(self.alone.level(state.level.states), x, v, state.phases)
 
-    def _drop_maps_to(self, states: tuple[int, ...], gone: _LevelEntry) -> None:
-        """Drop the maps to a level that is not kept any more."""
-        for _, entry in self._entries.items():
-            entry.ways.pop(states, None)
-
     @property
     def levels_kept(self) -> int:
         """Number of levels that are kept."""
         return len(self._entries)
-
-    @property
-    def ways(self) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-        """Pairs of levels, by their states, between which maps are kept."""
-        return [(source, target) for source, entry in self._entries.items() for target in entry.ways]
-
-    def transition(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
-        """Return the map between two levels, computed once as long as they are kept."""
-        ways = self._entry(source.states).ways
-        if target.states not in ways:
-            ways[target.states] = Transition(source, target)
-        return ways[target.states]
 
 
 def _longest_motion(model: MultiPhiModel, lasting: float) -> float:

@@ -19,7 +19,7 @@ __all__ = ["Event", "Loss", "Phase", "Row", "State", "event_table", "total_impul
 
 
 class Phase(Enum):
-    """What a contact waits for; see events/law."""
+    """What a contact waits for; see core/law/law.hpp."""
 
     ARMED = "armed"
     RECOVERING = "recovering"

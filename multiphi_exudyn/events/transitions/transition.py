@@ -24,14 +24,12 @@ Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dyna
 from __future__ import annotations
 
 import functools
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.level.level import Level
-from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 from multiphi_exudyn.mathematics.round_off import PRODUCT
 
 __all__ = ["Transition", "modal_projection"]
@@ -71,24 +69,6 @@ class Transition:
             return np.asarray(self.target.modal.vectors.T @ jump)
         _, constants = self._set_channels
         return np.concatenate([self.target.modal.vectors.T @ (jump - self._shapes @ constants), constants])
-
-    @property
-    def terms(self) -> np.ndarray | None:
-        """Sums of the absolute terms of T and c, None if no link holds a displacement.
-
-        They are larger than T and c where a slow part of a stiff mode cancels. That part is what a stiff link keeps of
-        its stretch, and what the first accelerations of a slip consist of.
-        """
-        if self.source.excitation.channels == self.source.excitation.prescribed:
-            return None
-        rows, constants = np.abs(self._set_channels[0]), np.abs(self._set_channels[1])
-        source, r = self.source, self.source.modal.modes
-        ends = np.abs(source.asymptotic.configuration) + np.abs(self.target.asymptotic.configuration)
-        moved = np.column_stack([np.abs(source.level.vectors), ends])
-        moved[:, r:-1] += np.abs(self._shapes)
-        set_by = np.column_stack([rows, constants])
-        kept = np.eye(len(rows), len(set_by[0]), r)
-        return np.vstack([np.abs(self.target.modal.vectors.T) @ (moved + np.abs(self._shapes) @ set_by), set_by + kept])
 
     @property
     def _shapes(self) -> np.ndarray:
@@ -143,19 +123,7 @@ def modal_projection(target: Level, source: Level) -> np.ndarray:
     considered.
     """
     products: np.ndarray = target.vectors.T @ source.vectors
-    clear_unmixed(products.ravel(), target.squares, source.squares, *products.shape)
+    own, other = np.abs(target.squares)[:, None], np.abs(source.squares)
+    share = np.sqrt(np.divide(other, own, out=np.ones(products.shape), where=own > other))
+    products[np.abs(products) <= np.maximum(PRODUCT, UNMIXED * share)] = 0.0
     return products
-
-
-@compiled
-def clear(products: Numbers, target: Numbers, source: Numbers, rows: int, columns: int) -> None:
-    """Set products (rows, columns) of modes with these omega^2 to zero if they are round-off in both energies."""
-    for i in range(rows):
-        for j in range(columns):
-            own, other, k = abs(target[i]), abs(source[j]), i * columns + j
-            share = math.sqrt(other / own) if own > other else 1.0
-            if abs(products[k]) <= max(PRODUCT, UNMIXED * share):
-                products[k] = 0.0
-
-
-clear_unmixed = entry(clear)

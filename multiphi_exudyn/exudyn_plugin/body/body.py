@@ -48,7 +48,7 @@ from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.loads.loads import Load
 from multiphi_exudyn.time.reliability.run_warnings import warnings_of_body
-from multiphi_exudyn.time.run.motion import Motion, motion_of
+from multiphi_exudyn.time.run.motion import Motion
 
 __all__ = ["MultiPhiBody"]
 
@@ -379,14 +379,12 @@ class MultiPhiBody:
 
     def _begin_stepwise_run(self, step: float) -> None:
         """Begin a step-by-step run with steps of this length [s]."""
-        self._motion.levels = self.own_loads.loaded_levels
-        exact = ExactMotion(self._motion, self.own_loads.static_levels, f"body {self.name!r}", self._time)
+        exact = ExactMotion(self.own_loads.loaded_levels, f"body {self.name!r}", self._time)
         self._stepwise_run = StepwiseRun(self, self.own_loads, exact, self._record, self._time, step, self._state)
 
     def _begin_run_ahead(self, mbs: Any, step: float, end: float) -> None:
         """Begin a run along the exact motion from the present state and time on."""
-        exact = motion_of(self.own_loads.loaded_levels, self._motion.start)
-        exact.is_summing_works = False  # a body does not report works
+        exact = Motion(self.own_loads.loaded_levels, self._motion.start, sums_works=False)
         motion, coordinates = KnownMotion(exact, self._state, self.time), self.coordinates
         coordinates.set_level_in_run(mbs, coordinates.stepped, coordinates.stepped.drive)
         self._run_ahead = RunAhead(self, motion, self._record, self.time, step, end)

@@ -10,7 +10,7 @@ impulse i on the body then changes its velocity by
 
 and -X R i is the impulse on it at the points. If R v in a new level's modes has an error e (m,), its velocity changes
 by -R^T X e. The accelerations of contacts at rest follow the same equation. A contact that attached parts leave no
-mobility stays open at its stop without a force, as does one that closed contacts leave none (events/law).
+mobility stays open at its stop without a force, as does one that closed contacts leave none (core/law).
 """
 
 from __future__ import annotations
@@ -18,16 +18,18 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.law.impact import IMMOVABLE
 from multiphi_exudyn.levels.base.modal_base import ModalBase
+from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 
 __all__ = ["AttachedInertia", "PointInertia", "Reactions"]
 
+KEPT = 16  # impedances: in base coordinates, and in the levels between which a body changes
 ROUND_OFF = 1e-15  # of the largest singular value: smaller ones count as zero
 RowsIn = Callable[[tuple[int, ...]], np.ndarray]  # R (m, r) by the states of a level
 
@@ -38,9 +40,15 @@ class AttachedInertia:
 
     mass: np.ndarray
     free: np.ndarray
+    _impedances: BoundedCache[tuple[int, bytes], np.ndarray] = field(
+        default_factory=lambda: BoundedCache(KEPT), init=False, repr=False, compare=False
+    )
 
     def impedance(self, rows: np.ndarray) -> np.ndarray:
-        """X (m, m) for a body whose points have the rows R (m, r)."""
+        """X (m, m) for a body whose points have the rows R (m, r); kept, as every force in a step asks for it."""
+        return self._impedances.get_or_build((rows.shape[1], rows.tobytes()), lambda: self._impedance(rows))
+
+    def _impedance(self, rows: np.ndarray) -> np.ndarray:
         mobility = rows @ rows.T
         constrained, k = self._constrained / (np.linalg.norm(mobility) or 1.0), self.free.shape[1]
         forces = np.concatenate([self.mass @ self.free, constrained], axis=1)
@@ -77,7 +85,7 @@ class AttachedInertia:
         rigid = _impact_links(base)
         directions = base.directions[:, rigid]
         responses = directions + in_base.T @ self.reactions(in_base, directions)
-        immovable = np.sum(directions * responses, axis=0) <= IMMOVABLE * np.sum(directions**2, axis=0)
+        immovable = np.sum(directions * responses, axis=0) <= core.IMMOVABLE * np.sum(directions**2, axis=0)
         return set(rigid[immovable].tolist())
 
 
@@ -112,7 +120,7 @@ class Reactions:
         push, point_push = self._pushes(level)
         acceleration = self._acceleration + push + self._rows.T @ point_push
         mobility, vectors = self._attached.mobilities(directions, self._rows)
-        moving = mobility > IMMOVABLE
+        moving = mobility > core.IMMOVABLE
         rigid_reactions = vectors[:, moving] @ (
             (vectors[:, moving].T @ (directions.T @ acceleration)) / mobility[moving]
         )
@@ -139,11 +147,10 @@ class PointInertia:
     in_base: R (m, b) of the points in base coordinates. rows_in: R (m, r) by the states of a level.
     """
 
-    independence = math.sqrt(IMMOVABLE)
+    independence = math.sqrt(core.IMMOVABLE)
 
     def __init__(self, attached: AttachedInertia, base: ModalBase, in_base: np.ndarray, rows_in: RowsIn) -> None:
         self._attached, self._base, self._in_base, self._rows_in = attached, base, in_base, rows_in
-        self._impedances = dict[tuple[int, ...], np.ndarray]()
 
     @functools.cached_property
     def immovable(self) -> set[int]:
@@ -152,14 +159,15 @@ class PointInertia:
 
     def mobility(self, states: tuple[int, ...]) -> np.ndarray:
         """F (r, r) with F F^T = B of a level."""
-        rows, impedance = self._rows_in(states), self._impedance(states)
+        rows = self._rows_in(states)
+        impedance = self._attached.impedance(rows)
         shares, vectors = np.linalg.eigh(np.eye(rows.shape[1]) - rows.T @ (impedance + impedance.T) @ rows / 2)
         return np.asarray(vectors * np.sqrt(np.maximum(shares, 0.0)))
 
     def velocity_map(self, source: tuple[int, ...], target: tuple[int, ...], matrix: np.ndarray) -> np.ndarray:
         """Matrix of eta'_m from eta'_l, with which attached masses keep their momentum when modes are truncated."""
         before, after = self._rows_in(source), self._rows_in(target)
-        return np.asarray(matrix - after.T @ (self._impedance(target) @ (after @ matrix - before)))
+        return np.asarray(matrix - after.T @ (self._attached.impedance(after) @ (after @ matrix - before)))
 
     def joining(self, rows: np.ndarray, difference: np.ndarray) -> np.ndarray:
         """Change -R^T X e (r,) of the modal velocity by an impact after which body and parts move as one at the points.
@@ -178,11 +186,6 @@ class PointInertia:
         reduced_rows = (vectors * np.sqrt(np.maximum(shares, 0.0)))[:, ::-1][:, : units.shape[1]]
         reduced[rigid, : reduced_rows.shape[1]] = reduced_rows
         return reduced
-
-    def _impedance(self, states: tuple[int, ...]) -> np.ndarray:
-        if states not in self._impedances:
-            self._impedances[states] = self._attached.impedance(self._rows_in(states))
-        return self._impedances[states]
 
 
 def _impact_links(base: ModalBase) -> np.ndarray:

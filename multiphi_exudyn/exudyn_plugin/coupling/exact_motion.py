@@ -1,7 +1,7 @@
-"""Exact motion of a body within a step, from event to event, under constant forces, by the loop of ``simulate``.
+"""Exact motion of a body within a step, from event to event, under constant forces, by the core.
 
-All bodies of the same levels share the arrays of the loop. So every advance first writes its state there, and the ring
-buffer of the chatter check.
+All bodies in the same levels share those under such forces: what has been made for one step serves all later ones, only
+its constants change. So the forces have to be set before every advance, where another body may have set its own.
 """
 
 from __future__ import annotations
@@ -11,29 +11,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
-from multiphi_exudyn.events import arrays as a
-from multiphi_exudyn.events.packing.level_arrays import LevelArrays
-from multiphi_exudyn.events.packing.start_arrays import set_state
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.transitions.state import Event, State
-from multiphi_exudyn.exudyn_plugin.coupling.modal_force import ConstantForces, Inertia, LevelForces
-from multiphi_exudyn.time.loop.chatter import limits
-from multiphi_exudyn.time.record.record import PHASES, Record
-from multiphi_exudyn.time.record.recorded_segments import Events
-from multiphi_exudyn.time.run.motion import Motion, carry, measured
-from multiphi_exudyn.time.trajectory.final_state import NUMBERS
+from multiphi_exudyn.events.transitions.state import Event, Loss, Phase, State
+from multiphi_exudyn.exudyn_plugin.coupling.modal_force import Inertia, LevelForces
+from multiphi_exudyn.levels.core_model import core_model
+from multiphi_exudyn.mathematics.blas_threads import one_blas_thread
+from multiphi_exudyn.mathematics.round_off import INDEPENDENT
+from multiphi_exudyn.mechanics.elements.element import Element, event_kind
+from multiphi_exudyn.time.core_levels import core_excitation, level_data
+from multiphi_exudyn.time.run.chatter import limits
+from multiphi_exudyn.time.run.failures import failure
 
 __all__ = ["AdvanceResult", "ExactMotion"]
 
-ROOM = 32  # segments that the arrays record before they are copied
+LEVEL_BYTES = 2**29  # of all levels under held forces: with more they are made anew
+CORE_PHASES = {phase: getattr(core.Phase, phase.name.lower()) for phase in Phase}
+PHASES = {number: phase for phase, number in CORE_PHASES.items()}
 
 
 @dataclass(frozen=True)
 class AdvanceResult:
     """Result of an advance: ``state`` at ``time`` [s], and the state right before its last event.
 
-    changed: whether an event occurred, or a request was refused.
+    changed: whether an event occurred, or a trial failed.
     """
 
     time: float
@@ -43,29 +45,28 @@ class AdvanceResult:
 
 
 class ExactMotion:
-    """Motions in the levels of ``motion``, in a run that begins at ``time`` [s].
+    """Motions in these levels under held forces, in a run that begins at ``time`` [s]; name: for messages of failures.
 
-    levels: those under static loads alone. name: for messages of failures.
+    Its states are those under static loads alone, without the forces.
     """
 
-    def __init__(self, motion: Motion, levels: LoadedLevels, name: str, time: float) -> None:
-        self._motion, self._levels, self._name = motion, levels, name
-        self._forces = motion.levels.held = motion.levels.held or _constant_forces(motion.levels)
-        self._arrays = motion.arrays = self._forces.arrays
-        self._window, self._allowed = limits(motion.model)
-        self._ring, self._decisions, self._last_decision = np.zeros(0), 0, time
-        self._record = Record(motion.model.contacts, self._arrays)
-
-    @property
-    def events(self) -> Sequence[Event]:
-        """Events of the run, without those of trials."""
-        return Events(self._record, self._record.losses.sum(axis=0))
+    def __init__(self, levels: LoadedLevels, name: str, time: float) -> None:
+        self._model, self._static_levels, self._name = levels.model, levels.alone, name
+        self._levels = levels.held = levels.held or _held_levels(levels)
+        self._run = core.Run(self._levels, *limits(self._model), time)
+        self._run.sums_works = self._run.keeps_summary = False  # a body does not report them
+        self._attached: Inertia | None = None
+        self._any_rigid = any(element.rigid and not element.held for element in self._model.contacts)
+        self.events: list[Event] = []
 
     def set_forces(self, forces: Callable[[tuple[int, ...]], LevelForces], inertia: Inertia | None) -> None:
         """Set the forces, a function of a level's states, and the inertia that is attached to the structure."""
-        if self._arrays.full:
-            self._forces.forget()
-        self._forces.set_forces(forces, inertia)
+        if self._levels.bytes > LEVEL_BYTES:
+            self._levels.forget()
+        self._levels.set_forces(forces, None if inertia is None else (inertia.mobility, inertia.velocity_map))
+        if self._any_rigid and inertia is not self._attached:
+            self._run.set_attached(*_attached(self._levels, inertia))
+            self._attached = inertia
 
     def advance(
         self, state: State, time: float, until: float, stop: bool = False, trial: bool = False
@@ -75,84 +76,66 @@ class ExactMotion:
         trial: the events are not recorded, as the advance will be repeated. A trial that fails ends in the state right
         before the failure.
         """
-        arrays = self._arrays
-        level = arrays.level(state.level.states)
-        arrays.begin_record()
-        self._write_ring()
-        self._write_start(level, state, time)
-        arrays.ints[a.STOP_AT_EVENT] = int(stop)
+        run, chatter = self._run, self._run.chatter if trial else None
         try:
             with np.errstate(all="ignore"):
-                changed = self._run(until, trial)
-        except (MultiPhiError, np.linalg.LinAlgError) as failure:
-            singular = "" if isinstance(failure, MultiPhiError) else "linear algebra of a level or an impact fails: "
-            at = float(arrays.numbers[a.TIME])
-            raise NumericalFailure(f"{self._name}: at t = {at:.9g} s: {singular}{failure}") from failure
-        if not trial:
-            self._read_ring()
-        after, end = self._state(a.CURRENT), float(arrays.numbers[a.TIME])
-        return AdvanceResult(end, after, changed, self._state(a.REACHED) if stop else after)
+                run.begin_step(time, _core_state(state))
+                told = run.advance(until, stop)
+            if told is not None and not trial:
+                raise failure(self._model, told, run.present.key)
+        except (MultiPhiError, np.linalg.LinAlgError) as error:
+            singular = "" if isinstance(error, MultiPhiError) else "linear algebra of a level or an impact fails: "
+            raise NumericalFailure(f"{self._name}: at t = {run.time:.9g} s: {singular}{error}") from error
+        finally:
+            events = _events(run.trajectory, self._model.contacts)
+            if chatter is None:
+                self.events.extend(events)
+            else:
+                run.chatter = chatter
+        after, changed = self._state(run.present), told is not None or bool(events)
+        return AdvanceResult(run.time, after, changed, self._state(run.reached) if stop else after)
 
-    def _write_ring(self) -> None:
-        """Write the ring buffer of the chatter check into the arrays, which other bodies use too."""
-        arrays = self._arrays
-        arrays.set_chatter(self._window, self._decisions, self._ring)
-        arrays.numbers[a.ALLOWED], arrays.numbers[a.LAST_DECISION] = self._allowed, self._last_decision
-
-    def _read_ring(self) -> None:
-        """Read the ring buffer of the chatter check from the arrays."""
-        arrays = self._arrays
-        if arrays.ints[a.DECISIONS] != self._decisions:
-            self._decisions, self._ring = arrays.chatter
-            self._last_decision = float(arrays.numbers[a.LAST_DECISION])
-
-    def _write_start(self, level: int, state: State, time: float) -> None:
-        """Write a state at a time [s] into the arrays."""
-        arrays, centre = self._arrays, self._forces.centre(level)
-        r, arrays.numbers[a.TIME] = len(centre), time
-        position, velocity = state.displacement.copy(), state.velocity
-        position[:r] -= centre
-        w, w_t = arrays.channels.at(arrays.buffers, time)
-        if len(w):
-            position, velocity = (np.concatenate([x[:r], at, x[r:]]) for x, at in ((position, w), (velocity, w_t)))
-        set_state(arrays, level, position, velocity, [NUMBERS[phase] for phase in state.phases], measured)
-
-    def _run(self, until: float, trial: bool) -> bool:
-        """Run the loop until it ends, and supply the levels it needs; whether an event occurred or was refused."""
-        arrays, changed = self._arrays, False
-        while True:
-            status = int(arrays.buffers.bound(carry)(until))
-            if status == a.NEED:
-                arrays.supply()
-                if not arrays.outgrown:
-                    continue
-            changed = changed or bool(arrays.ints[a.EVENT_COUNT])
-            if not trial:
-                self._record.collect_events()
-                if status == a.FAILED:
-                    raise self._motion.failure()
-            if status not in (a.FULL, a.NEED):
-                return changed or status == a.FAILED
-            arrays.begin_record()
-
-    def _state(self, position: int) -> State:
-        """A state in the arrays, in coordinates of the levels under static loads."""
-        ints, numbers = self._arrays.ints, self._arrays.numbers
-        state = ints[position : position + a.STATE_INTS].tolist()
-        record, phases = state[a.LEVEL], state[a.PHASES]
-        level = self._levels.level(self._arrays.loaded[int(ints[record + a.NUMBER])].states)
-        phase_numbers = ints[phases : phases + ints[record + a.EXIT_COUNT]].tolist()
-        r, q = level.modal.modes, int(ints[a.PRESCRIBED])
-        n = r + int(ints[a.CHANNELS])
-        xi, xi_t = (numbers[start : start + n].copy() for start in (state[a.PLACE], state[a.SPEED]))
-        if q:
-            xi, xi_t = (np.delete(x, slice(r, r + q)) for x in (xi, xi_t))
-        xi[:r] += self._forces.centre(record)
-        return State(level, xi, xi_t, tuple([PHASES[k] for k in phase_numbers]))
+    def _state(self, state: core.StepState) -> State:
+        phases = tuple([PHASES[phase] for phase in state.phases])
+        return State(self._static_levels.level(state.key), state.displacement, state.velocity, phases)
 
 
-def _constant_forces(levels: LoadedLevels) -> ConstantForces:
-    """Constant forces in levels, with arrays that only bodies use."""
-    arrays = LevelArrays(levels)
-    arrays.room = ROOM
-    return ConstantForces(arrays)
+def _held_levels(levels: LoadedLevels) -> core.HeldLevels:
+    """Levels under held forces, each built on first use."""
+
+    @one_blas_thread()
+    def build(states: Sequence[int]) -> core.LevelData:
+        return level_data(levels.level(states))
+
+    return core.HeldLevels(core_model(levels.model), core_excitation(levels), build)
+
+
+def _core_state(state: State) -> core.StepState:
+    phases = [CORE_PHASES[phase] for phase in state.phases]
+    return core.StepState(state.level.states, state.displacement, state.velocity, phases)
+
+
+def _attached(levels: core.HeldLevels, inertia: Inertia | None) -> tuple[np.ndarray, float, list[int]]:
+    """Directions of the links under attached inertia, empty without it, which of them are redundant, and immovable."""
+    if inertia is None:
+        return np.zeros((0, 0)), INDEPENDENT, []
+    directions, elements = levels.model.unit_directions, levels.model.size
+    directions[:elements] = inertia.directions(directions[:elements])
+    return directions, inertia.independence, list(inertia.immovable)
+
+
+def _events(trajectory: core.Trajectory, elements: Sequence[Element]) -> list[Event]:
+    """Events of a trajectory; an impulse on a contact that stays closed belongs to the next one."""
+    events, shared = list[Event](), list[tuple[str, float]]()
+    names = "times", "elements", "entered", "left", "impulses", "losses"
+    columns = (getattr(trajectory, f"event_{name}").tolist() for name in names)
+    for time, index, entered, left, impulse, loss in zip(*columns, strict=True):
+        element = elements[index]
+        if entered == core.SHARED:
+            shared.append((element.name, impulse))
+            continue
+        kind = event_kind(element.states, left, entered)
+        state = element.states[entered].name
+        events.append(Event(time, element.name, kind, Loss(*loss), impulse, tuple(shared), state))
+        shared.clear()
+    return events

@@ -20,24 +20,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn._core import are_independent
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.eigenproblems.modes import Modes
-from multiphi_exudyn.mathematics.orthonormal import span
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.elements.element import Element
 from multiphi_exudyn.mechanics.elements.element_table import ElementTable
 from multiphi_exudyn.mechanics.structures.arguments import Matrix
 
-__all__ = ["GAPS", "LENGTHS", "SPRINGS", "SQUARES", "ModalBase", "parallel"]
+__all__ = ["ModalBase", "parallel"]
 
 PARALLEL = 1e-14  # of the largest component: directions that differ by less differ by round-off
 INTERLACING = 1e-8  # relative violation of the interlacing theorem that is still round-off
 EPSILON = float(np.finfo(float).eps)
 CLOSED_SETS = 8  # of contacts, whose directions are cached: a level needs them when it is built and when it is loaded
 CANCELLED = 1e-13  # of sum |k|: a total stiffness of a force law below it is round-off of zero
-GAPS, SPRINGS, LENGTHS, SQUARES = range(4)  # numbers of links, in their order (``ModalBase.link_numbers``)
 
 
 @dataclass(frozen=True, repr=False)
@@ -120,33 +119,16 @@ class ModalBase(ElementTable, Shown):
         return rows, np.concatenate([np.linalg.norm(rows, axis=1), np.ones(self.modes.count)])
 
     @functools.cached_property
-    def level_numbers(self) -> np.ndarray:
-        """What rows of a level depend on, one after the other (level_rows.py).
-
-        Sizes of ``observed_rows`` (k + m,), ``lengths`` (l,), ``square_bounds`` (2, m), ``squares`` (m,), ``restoring``
-        (2, l), and ``observed_rows`` (k, m), those of links first.
-        """
-        rows, sizes = self.observed_rows
-        parts = sizes, self.lengths, *self.square_bounds, self.squares, self.restoring, rows
-        return np.concatenate(parts, axis=None)
-
-    @functools.cached_property
-    def link_numbers(self) -> np.ndarray:
-        """What equilibria and defects take of links, one after the other.
-
-        Directions (l, m), gaps, ``springs`` and ``lengths`` (l,), ``squares`` and ``periods`` (m,). Behind l (m + i)
-        numbers begin those with i = ``GAPS``, ``SPRINGS``, ``LENGTHS`` and ``SQUARES``.
-        """
-        parts = self.directions.T, self.gaps, self.springs, self.lengths, self.squares, self.periods
-        return np.concatenate(parts, axis=None)
+    def direction_rows(self) -> np.ndarray:
+        """Directions (l, m) of links, row by row in memory."""
+        return np.ascontiguousarray(self.directions.T)
 
     def independent(self, rigid: Sequence[int]) -> bool:
         """Return whether the directions of these rigid contacts are linearly independent: they can close together."""
         m, k = self.modes.count, len(rigid)
         if k <= 1 or k > m:
             return k <= m and not any(self.unmoved[i] for i in rigid)
-        lengths, memory = len(self.links) * (m + LENGTHS), np.empty((k + 1) * m)
-        return bool(span(self.link_numbers, 0, lengths, np.array(rigid, int), 0, memory, 0, m, k))
+        return bool(are_independent(self.direction_rows, self.lengths, list(rigid)))
 
     @functools.cached_property
     def direction_indices(self) -> list[int]:

@@ -43,27 +43,25 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
         zero = squares == 0
         neutral = vectors[:, zero] if np.count_nonzero(zero) > rigid_body else None
     squares, vectors = squares[:kept].copy(), vectors[:, :kept]  # a view would keep all that was computed
-    stiffnesses = closed_directions.stiffness.tolist()
-    rows = level_rows(base, closed, stiffnesses, squares, vectors, accuracy, check=is_vibrating)
-    if rows is None:
+    if is_vibrating:
         squares, vectors = aligned_clusters(squares, vectors, *base.observed_rows)
-        rows = level_rows(base, closed, stiffnesses, squares, vectors, accuracy, check=False)
-    assert rows is not None, "it is None only where clusters are checked"
+    rows = level_rows(base, closed, closed_directions.stiffness, squares, vectors, accuracy)
+    vectors, damping, gaps = rows.modes.T, rows.damping, rows.gaps
     if not is_vibrating:
-        drop_damping_of_free_modes(base, closed, squares == 0, rows.damping)
+        drop_damping_of_free_modes(base, closed, squares == 0, damping)
     return Level(
         closed=tuple(base.links[i].name for i in closed if i not in base.laws),
         indices=indices,
         base=base,
         squares=squares,
-        vectors=rows.vectors,
-        damping=rows.damping,
-        gap_rows=rows.gaps,
+        vectors=vectors,
+        damping=damping,
+        gap_rows=gaps,
         following=rows.following,
-        speed_rows=rows.gaps,
+        speed_rows=gaps,
         force_rows=rows.forces,
         force_rate_rows=rows.force_rates,
-        neutral=rows.vectors[:, :0] if neutral is None else neutral,
+        neutral=vectors[:, :0] if neutral is None else neutral,
         computed=squares,
         kept_beyond=0,
     )

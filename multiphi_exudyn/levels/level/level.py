@@ -15,10 +15,11 @@ import functools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
@@ -32,9 +33,7 @@ from multiphi_exudyn.levels.level.static_response import (
     static_response,
 )
 from multiphi_exudyn.mathematics.eigenproblems.modes import cluster_end
-from multiphi_exudyn.mathematics.response.coupled_response import modal_response
-from multiphi_exudyn.mathematics.response.free_response import ModalResponse, is_slow
-from multiphi_exudyn.mathematics.round_off import BALANCED, ZERO, drop_round_off
+from multiphi_exudyn.mathematics.round_off import BALANCED, SLOW, ZERO, drop_round_off
 from multiphi_exudyn.mechanics.structures.arguments import real_array
 
 if TYPE_CHECKING:
@@ -111,6 +110,9 @@ class Level(Shown):
     neutral: np.ndarray
     computed: np.ndarray
     kept_beyond: int
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {key: value for key, value in vars(self).items() if key != "response"}  # of the core: a copy asks again
 
     def _facts(self) -> Iterator[tuple[str, str]]:
         yield "closed", names(self.closed)
@@ -203,16 +205,18 @@ class Level(Shown):
         return self.base.modes.shapes @ unloaded.configuration
 
     @functools.cached_property
-    def response(self) -> ModalResponse:
+    def response(self) -> core.ModalResponse:
         """Closed form of the level's motion, of any duration."""
-        return modal_response(self.squares, self.damping_matrix, self.coupling)
+        return core.modal_response(self.squares, self.damping_matrix, self.coupling)
 
-    def response_within(self, duration: float) -> ModalResponse:
+    def response_within(self, duration: float) -> core.ModalResponse:
         """Return the closed form of motions of at most ``duration`` [s], also with slowly damped rigid-body modes."""
-        rates = self.response.basis.rates
-        if self.vibrates or not np.any((rates != 0) & is_slow(rates, duration)):
+        if self.vibrates:
             return self.response
-        return modal_response(self.squares, self.damping_matrix, self.coupling, duration)
+        rates = np.abs(self.response.basis.rates)
+        if not np.any((rates != 0) & (rates <= SLOW / duration)):
+            return self.response
+        return core.modal_response(self.squares, self.damping_matrix, self.coupling, duration)
 
     def truncated(self, count: int) -> Level:
         """Return a level with the lowest ``count`` modes of this one, and those that complete a cluster.

@@ -9,8 +9,8 @@ w = sqrt|K| Phi^T p, as
 again by singular values; mu = 0 unless the level is indefinite or nearly so.
 
 Where one direction alone is closed, with K > 0, the lowest modes are those of a rank-one change, roots of its secular
-equation (secular_equation.py); a few directions are as many such changes. Otherwise, for a quarter of the modes or
-fewer, in a base without rigid-body modes and with no K < 0, they are the largest eigenvectors of the level's
+equation (core/secular_equation.hpp); a few directions are as many such changes. Otherwise, for a quarter of the modes
+or fewer, in a base without rigid-body modes and with no K < 0, they are the largest eigenvectors of the level's
 compliance, which differs from that of the base by a matrix of rank d,
 
     A = Omega^-2 - Omega^-2 P (1/K + P^T Omega^-2 P)^-1 P^T Omega^-2            (rigid: 1/K = 0)
@@ -33,11 +33,11 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse.linalg
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.eigenproblems.modes import right_singular_vectors
-from multiphi_exudyn.mathematics.eigenproblems.secular_equation import rank_one_modes
 from multiphi_exudyn.mathematics.orthonormal import product_error, without
 
 __all__ = ["level_modes"]
@@ -104,11 +104,11 @@ def _rank_one_changes(
         for change in changes:
             direction = direction @ change
         count = modes if j == sprung[-1] else len(squares) - math.isinf(stiffness[j])
-        solution = rank_one_modes(squares, direction, stiffness[j], count)
+        solution = core.rank_one_modes(squares, direction, stiffness[j], count)
         if solution is None:
             return None
         squares = solution[0]
-        changes.append(solution[1])
+        changes.append(solution[1].T)
     if len(changes) == 1:
         return squares, changes[0], 0.0
     vectors = functools.reduce(lambda later, change: change @ later, reversed(changes))

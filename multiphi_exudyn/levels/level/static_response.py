@@ -17,9 +17,7 @@ import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
-from multiphi_exudyn.levels.base.modal_base import GAPS, SPRINGS, SQUARES, ModalBase
-from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
-from multiphi_exudyn.mathematics.orthonormal import absolute_product, scalar_product
+from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.round_off import FOLLOWING, INDEPENDENT, PRODUCT, ZERO, drop_round_off
 
 __all__ = ["Asymptotic", "gaps_and_strain", "response_of_neutral_level", "static_response"]
@@ -56,48 +54,32 @@ def static_response(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return forces (d,) along closed directions and y (m,) of the static response, without unresisted motion."""
     if len(closed_directions.stiffness) == 1 and not base.modes.rigid:
-        along, configuration = np.ascontiguousarray(closed_directions.vectors[:, 0]), np.empty(len(load))
         stiffness, offset = float(closed_directions.stiffness[0]), float(closed_directions.offsets[0])
-        force = single_response(
-            along, base.compliance, np.array(load, float), configuration, stiffness, offset, len(load)
-        )
-        if math.isfinite(force):
-            return np.array([force]), configuration
+        response = single_direction_response(closed_directions.vectors[:, 0], base.compliance, load, stiffness, offset)
+        if response is not None:
+            return np.array([response[0]]), response[1]
     forces, configuration = _response(base, closed_directions.orthogonal, load)
     return closed_directions.from_orthogonal(forces), configuration
 
 
-@compiled
 def single_direction_response(
-    along: Numbers, compliance: Numbers, load: Numbers, result: Numbers, stiffness: float, offset: float, m: int
-) -> float:
-    """Return the force along one direction p (m,) and write y (m,) to the result; infinite or NaN without a solution.
+    along: np.ndarray, compliance: np.ndarray, load: np.ndarray, stiffness: float, offset: float
+) -> tuple[float, np.ndarray] | None:
+    """Return the force along one direction p (m,) and y (m,); None without a solution.
 
     The same as ``_response`` for one direction. The force is corrected once for round-off magnified by soft modes.
     """
-    sprung = 1.0 if stiffness != 0.0 else 0.0
-    compliance_of_spring, deflection, loaded_deflection = 1.0 / stiffness if stiffness != 0.0 else 1.0, 0.0, 0.0
-    for i in range(m):
-        deflection += along[i] * (compliance[i] * along[i])
-        loaded_deflection += load[i] * (compliance[i] * along[i])
-    flexibility = compliance_of_spring + sprung * deflection
-    if flexibility == 0.0:
-        return math.inf
-    force, moved = (-offset - sprung * loaded_deflection) / flexibility, 0.0
-    for i in range(m):
-        contact_force = along[i] * force
-        total = load[i] + contact_force
-        if abs(total) <= ZERO * (abs(load[i]) + abs(contact_force)):
-            total = 0.0
-        result[i] = compliance[i] * total
-        moved += along[i] * result[i]
-    correction = -(offset + compliance_of_spring * force + sprung * moved) / flexibility
-    for i in range(m):
-        result[i] += compliance[i] * along[i] * correction
-    return force + correction
-
-
-single_response = entry(single_direction_response)
+    deflections, sprung = compliance * along, stiffness != 0.0
+    spring_compliance = 1 / stiffness if sprung else 1.0
+    flexibility = spring_compliance + sprung * float(along @ deflections)
+    if not math.isfinite(flexibility) or flexibility == 0.0:
+        return None
+    force = (-offset - sprung * float(load @ deflections)) / flexibility
+    pushes = along * force
+    configuration = compliance * drop_round_off(load + pushes, np.abs(load) + np.abs(pushes))
+    correction = -(offset + spring_compliance * force + sprung * float(along @ configuration)) / flexibility
+    force += correction
+    return (force, configuration + deflections * correction) if math.isfinite(force) else None
 
 
 def gaps_and_strain(
@@ -108,33 +90,13 @@ def gaps_and_strain(
     That of the structure, of the springs of closed links, and of the constant forces of force laws. following (l,):
     gaps that others determine.
     """
-    gaps, y = np.array(following, float), np.ascontiguousarray(configuration)
-    energy = float(write_gaps(base.link_numbers, y, gaps, np.array(closed, int), len(y), len(gaps), len(closed)))
+    directions, constants = base.magnitudes
+    sums, sizes = base.gaps_at(configuration, base.gaps), directions.T @ np.abs(configuration) + constants
+    gaps = np.where(np.abs(sums) > np.where(following, FOLLOWING, ZERO) * sizes, sums, 0.0)
+    energy = 0.5 * float(base.squares @ configuration**2 + base.springs[closed] @ gaps[closed] ** 2)
     if base.laws:
-        energy += base.energy_offset - float(base.preload @ y)
+        energy += base.energy_offset - float(base.preload @ configuration)
     return gaps, energy
-
-
-@compiled
-def write_gaps_and_strain(links: Numbers, y: Numbers, gaps: Numbers, closed: Ints, m: int, count: int, k: int) -> float:
-    """Replace flags of links that follow others by gaps; return the energy of the structure and of k closed springs.
-
-    links: ``ModalBase.link_numbers``, of ``count`` links.
-    """
-    energy, constants, springs, squares = 0.0, count * (m + GAPS), count * (m + SPRINGS), count * (m + SQUARES)
-    for link in range(count):
-        gap = links[constants + link] + scalar_product(links, link * m, y, 0, m)
-        size = abs(links[constants + link]) + absolute_product(links, link * m, y, 0, m)
-        tolerance = FOLLOWING if gaps[link] == 1.0 else ZERO
-        gaps[link] = gap if abs(gap) > tolerance * size else 0.0
-    for i in range(m):
-        energy += links[squares + i] * y[i] * y[i]
-    for p in range(k):
-        energy += links[springs + closed[p]] * gaps[closed[p]] * gaps[closed[p]]
-    return 0.5 * energy
-
-
-write_gaps = entry(write_gaps_and_strain)
 
 
 def response_of_neutral_level(

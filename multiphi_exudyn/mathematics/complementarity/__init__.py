@@ -1,4 +1,4 @@
-"""Complementarity: the small problem of contact and friction, lo <= z <= hi complementary to W z + b.
+"""Complementarity: where the small problem of contact and friction stands in Python (core/complementarity.hpp).
 
-Order: least_distance, free_rows, row_sides, principal_pivoting, coulomb_impacts.
+Order: least_distance, coulomb_impacts.
 """

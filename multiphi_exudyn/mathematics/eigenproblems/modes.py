@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.mathematics.compiling.compiled import Numbers, compiled, entry
 from multiphi_exudyn.mathematics.eigenproblems.massless_motions import not_definite
 from multiphi_exudyn.mathematics.eigenproblems.stiffness_digits import (
     digits_of,
@@ -31,19 +31,16 @@ from multiphi_exudyn.mathematics.eigenproblems.stiffness_digits import (
     energy_noise,
     is_exact,
 )
-from multiphi_exudyn.mathematics.orthonormal import scalar_product
 
 __all__ = [
     "NEAR",
     "ROUND_OFF",
     "Modes",
-    "align_signs",
     "aligned_clusters",
     "aligned_modes",
     "cluster_end",
     "complete_modes",
     "first_shift",
-    "has_clusters",
     "indefinite",
     "modes_from_squares",
     "right_singular_vectors",
@@ -60,9 +57,7 @@ NO_ENERGY = 1e-9  # of ROUND_OFF: exact strain energy of a rigid-body mode, whic
 SOFT = 1e-10  # round-off of omega^2 above which a mode is soft beside its strain energies
 ALONE = 0.5  # of omega^2 of the next mode: soft modes up to such a gap are made exact together
 REFINEMENTS = 3  # each squares the error that other modes leave in soft ones
-EQUAL = 1e-11  # of omega^2: nearer ones are equal up to the round-off of matrices and eigenvalues
 NEAR = 1e-6  # of omega^2: round-off mixes nearer modes by more than 1e-10, so they are kept together
-MOVES = 1e-5  # of the largest value of a row: of smaller values, round-off could choose the sign of a mode
 ROTATED = 1e-14  # of a coordinate's amplitude in a cluster: a smaller value after a rotation is round-off
 
 
@@ -190,18 +185,15 @@ def aligned_modes(
     one.
     """
     squares, shapes = aligned_clusters(squares, shapes, rows, sizes)
-    modes, values = np.array(shapes.T, order="C"), rows @ shapes
-    set_signs(
-        modes.ravel(), sizes, values.ravel(), values.ravel(), 0, np.empty(len(modes)), *shapes.shape, len(rows), 0
-    )
-    return squares, modes.T, values
+    signs = core.signs(shapes.T, rows, sizes)
+    return squares, shapes * signs, (rows @ shapes) * signs
 
 
 def aligned_clusters(
     squares: np.ndarray, shapes: np.ndarray, rows: np.ndarray, sizes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return omega^2 and modes of ``aligned_modes``, with unique bases of clusters and any signs."""
-    clusters = _clusters(squares)
+    clusters = core.clusters(squares)
     if not clusters:
         return squares, shapes
     squares, shapes, values = squares.copy(), shapes.copy(), rows @ shapes
@@ -223,64 +215,6 @@ def cluster_end(squares: np.ndarray, count: int) -> int | None:
     return next((end for end, (lower, upper) in steps if upper - lower > NEAR * abs(upper)), None)
 
 
-@compiled
-def has_clusters(squares: Numbers, m: int) -> int:
-    """Return 1 where two of ascending omega^2 (m,) are equal, else 0."""
-    for j in range(1, m):
-        if squares[j] - squares[j - 1] <= EQUAL * max(abs(squares[j]), abs(squares[j - 1])):
-            return 1
-    return 0
-
-
-@compiled
-def align_signs(
-    modes: Numbers,
-    sizes: Numbers,
-    values: Numbers,
-    rows: Numbers,
-    start: int,
-    signs: Numbers,
-    n: int,
-    m: int,
-    k: int,
-    further: int,
-) -> None:
-    """Make the first value of modes (m, n) in rows, then in the coordinates themselves, positive; write the signs (m,).
-
-    values: (k, m), of the first rows. rows: these and ``further`` ones, (., n) from ``start`` on. Where no value is
-    clear the largest one counts.
-    """
-    for j in range(m):
-        largest, sign = -1.0, 1.0
-        for i in range(k + further + n):
-            if i < k:
-                value = values[i * m + j]
-            elif i < k + further:
-                value = scalar_product(rows, start + i * n, modes, j * n, n)
-            else:
-                value = modes[j * n + i - k - further]
-            share = abs(value) / sizes[i] if sizes[i] > 0.0 else 0.0
-            if share > largest:
-                largest, sign = share, -1.0 if value < 0.0 else 1.0
-            if share > MOVES:
-                break
-        signs[j] = sign
-        for i in range(n if sign < 0.0 else 0):
-            modes[j * n + i] = -modes[j * n + i]
-        for i in range(k if sign < 0.0 else 0):
-            values[i * m + j] = -values[i * m + j]
-
-
-set_signs = entry(align_signs)
-
-
-def _clusters(squares: np.ndarray) -> list[tuple[int, int]]:
-    """Return the first and one past the last mode of every cluster of two or more equal omega^2, ascending."""
-    apart = np.diff(squares) > EQUAL * np.maximum(np.abs(squares[1:]), np.abs(squares[:-1]))
-    ends = (np.flatnonzero(apart) + 1).tolist()
-    return [(first, last) for first, last in itertools.pairwise([0, *ends, len(squares)]) if last - first > 1]
-
-
 def _alignment(values: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Return a rotation (d, d) of d modes after which each has its own first row; values: (k, d) of all rows."""
     rotation = np.eye(values.shape[1])
@@ -295,7 +229,7 @@ def _alignment(values: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 
 def _first_row(values: np.ndarray, sizes: np.ndarray) -> int:
     """Return the first row with a value (k,), else the one of largest value."""
-    is_present = values > MOVES * sizes
+    is_present = values > core.MOVES * sizes
     if is_present.any():
         return int(is_present.argmax())
     return int(np.divide(values, sizes, out=np.zeros_like(values), where=sizes > 0).argmax())

@@ -154,12 +154,6 @@ class ElementTable:
         return bool(self.held) or any(any(pushes) for pushes in self.pushes_of_states)
 
     @functools.cached_property
-    def frictionless_rigid_contacts(self) -> np.ndarray:
-        """Indices of the rigid contacts in a model without friction, where an impulse has a contact's own direction."""
-        has_friction = any(element.further or element.held for element in self.contacts)
-        return np.array([i for i, element in enumerate(self.contacts) if element.rigid and not has_friction], int)
-
-    @functools.cached_property
     def levels_possible(self) -> int:
         """Number of levels: the product of the states of all elements."""
         return math.prod(len(contact.states) for contact in self.contacts)

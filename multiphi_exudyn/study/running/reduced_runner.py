@@ -34,7 +34,7 @@ Prepared = tuple[MultiPhiModel, Equilibrium]
 class ReducedRunner(Runner):
     """Run the Multi-Phi model of an entry of the scene."""
 
-    compiled = True
+    builds_levels = True
 
     @property
     def label(self) -> str:

@@ -1,7 +1,7 @@
 """Base class of the runners of all kinds of models: preparation, timed solution, histories, check of energy gain.
 
 Offline: discretisation, linearisation, modes, and here the static start. Online: the solver alone, from the start to
-the end of the run. The event loop is compiled before the timing starts, since a machine compiles it once.
+the end of the run.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.mathematics.compiling.compiled import available, compile_entries
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.running.timing import repeated, timed
 from multiphi_exudyn.study.scene.workbench import Setup, start_equilibrium
@@ -29,7 +28,7 @@ ENERGY_INTERVAL = 1e-3  # s, between samples of the energy
 class Runner(ABC):
     """Runner of one model of a scene. spec: its entry in the scene; other fields: see ``run_model``."""
 
-    compiled: ClassVar[bool] = False  # whether the solver needs the compiled loop
+    builds_levels: ClassVar[bool] = False  # in its first run, which takes longer than a repeat
     may_gain_energy: ClassVar[bool] = False  # whether time integration may gain energy, an error
 
     setup: Setup
@@ -66,9 +65,9 @@ class Runner(ABC):
 
     def run(self) -> ModelRun:
         """Prepare, solve and sample."""
-        prepared, preparation_s = self._prepared()
+        prepared, preparation_s = timed(self.prepare)
         answer, first = self.solve(prepared)
-        as_long = 0.0 if self.compiled else first  # a first run that builds levels takes longer than a repeat
+        as_long = 0.0 if self.builds_levels else first
         repeats = repeated(lambda: self.solve(prepared)[1], as_long, self.repeats(answer))
         run = ModelRun(
             name=self.spec.name,
@@ -92,17 +91,11 @@ class Runner(ABC):
 
         Raises NumericalFailure where the answer has failed.
         """
-        prepared, _ = self._prepared()
+        prepared = self.prepare()
         outcome = self.outcome(prepared, self.solve(prepared)[0])
         if outcome["status"] != "ok":
             raise NumericalFailure(f"{self.label}: {outcome['message']}")
         return lambda: self.solve(prepared)[1]
-
-    def _prepared(self) -> tuple[Any, float]:
-        """What ``prepare`` gives, and its time [s], which is not that of compiling."""
-        if self.compiled and available():
-            compile_entries()
-        return timed(self.prepare)
 
     def level_text(self) -> str:
         """Kind of levels, as part of a label."""

@@ -75,7 +75,7 @@ class StepwiseRunner(_StepRunner):
 class SplittingRunner(_StepRunner):
     """A Craig-Bampton component by Strang splitting; a motion that overflows is a failed run."""
 
-    compiled = True
+    builds_levels = True
 
     def sampler(self, answer: Any) -> Callable[[Sequence[str], np.ndarray], StepwiseHistories]:
         return partial(answer.histories, self.setup.structure)

@@ -217,7 +217,7 @@ def energy_rise(run: Trajectory, segments: Sequence[Segment], samples: int = 5) 
 def missed(
     run: Trajectory, segments: Sequence[Segment], samples: float, metre: float = 1.0, budget: float = np.inf
 ) -> str | None:
-    """No contact leaves the admissible range of its state without an event: s >= 0 (events/law).
+    """No contact leaves the admissible range of its state without an event: s >= 0 (core/law).
 
     In a truncated basis this is checked for armed contacts and for closed rigid ones, which never pull. Round-off is
     that of the whole run: an impact that stops all motion leaves a state that is round-off of the one before, and a

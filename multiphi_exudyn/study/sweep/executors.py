@@ -29,7 +29,6 @@ from typing import ParamSpec, TypeVar
 from threadpoolctl import threadpool_limits
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError
-from multiphi_exudyn.mathematics.compiling.compiled import compile_entries
 
 if sys.platform == "linux":
     import fcntl
@@ -149,7 +148,6 @@ def _end_with(end: Connection) -> None:
 
 @contextmanager
 def _processes(workers: int) -> Iterator[Executor]:
-    compile_entries()  # once, here: else every worker compiles the loop at its first run
     with WorkerPool(workers) as pool:
         try:
             yield pool

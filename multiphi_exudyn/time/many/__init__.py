@@ -1,4 +1,4 @@
 """Many runs of one model that differ in their starts, on all cores.
 
-Order: batch_loop, batch, workers, many.
+Order: workers, many.
 """

@@ -1,8 +1,7 @@
 """Many runs of one model that differ in their starts alone, on all cores.
 
-A thread has arrays of its own, on which a batch of runs at a time advances to the end (batch.py); levels are built
-once, for all. Other threads run during the compiled loop; everything else is done by one thread at a time, so every run
-is the same, to the bit, as a run alone, for any number of threads. Only the requested samples of a run are kept.
+The core advances a batch of runs at a time on its threads; levels are built once, for all. Every run is the same, to
+the bit, as a run alone, for any number of threads. Only the requested samples of a run are kept.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.levels.model.mode_choice import is_count
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mathematics.compiling.compiled import available
 from multiphi_exudyn.mechanics.loads.loads import Load
 from multiphi_exudyn.mechanics.structures.arguments import no_text, real_array
 from multiphi_exudyn.mechanics.structures.structure import At
@@ -105,8 +103,7 @@ def simulate_many(
     times : array (t,), default None
         At which they are [s], None for the end alone.
     threads : int, default None
-        Number of threads, without effect on the answer. None for the number of cores, and for one where the loop is
-        plain Python: all but the compiled loop is done by one thread at a time.
+        Number of threads, without effect on the answer. None for the number of cores.
 
     Returns
     -------
@@ -181,4 +178,4 @@ def _checked(threads: int | None) -> int:
         raise MultiPhiTypeError(f"threads: got {threads!r}, need an integer or None")
     if threads is not None and threads < 1:
         raise MultiPhiValueError(f"threads: got {threads}, need at least 1")
-    return threads or (os.cpu_count() if available() else None) or 1
+    return threads or os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""Record: segments and events of a run, copied out of the loop's arrays; samples, and works that the loop left out.
+"""Record: segments and events of a run, which the core keeps; samples, and works that its loop left out.
 
-Order: segment_restart, sampling, work_terms, work, growing_array, loop_copies, record, recorded_segments.
+Order: record, recorded_segments.
 """

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import bisect
+import copy
 import functools
 from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar, overload
 
 import numpy as np
 
-from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import Event, Loss
 from multiphi_exudyn.mechanics.elements.element import event_kind
@@ -19,7 +18,6 @@ from multiphi_exudyn.time.segments.segment import Segment, Segments
 __all__ = ["Events", "Recorded"]
 
 T = TypeVar("T")
-NO_SUMS = np.full(a.VERDICT + 2 - a.WORKS, np.nan)
 
 
 class LazySequence(Sequence[T], Generic[T]):
@@ -55,53 +53,50 @@ class LazySequence(Sequence[T], Generic[T]):
 
 
 class Recorded(LazySequence[Segment], Segments):
-    """The segments of a record so far.
+    """The segments of a record so far."""
 
-    sums: as the loop has them from WORKS on: works (3,) [J] of all segments that the record does not list as left out,
-    defects, truncated and verdict (2,), see Segments.
-    """
-
-    def __init__(self, record: Record, sums: np.ndarray = NO_SUMS) -> None:
+    def __init__(self, record: Record) -> None:
         self._make, self._count, self._made = record.segment, record.count, {}
-        self._record, self.arrays = record, record.arrays
-        self._sums, self._left_out = sums, record.left_out_count
+        self._record = record
+        # copies, as the run may go on
+        self._truncation = copy.copy(record.trajectory.truncation)
+        self._works = copy.copy(record.trajectory.ledger.works)
         self._sizes: dict[float, tuple[float, float]] = {}  # by the end of the time
 
     @property
     def defects(self) -> float:
         """See ``Segments``."""
-        return float(self._sums[a.DEFECTS - a.WORKS])
+        return self._truncation.defects
 
     @property
     def truncated(self) -> float:
         """See ``Segments``."""
-        return float(self._sums[a.TRUNCATED - a.WORKS])
+        return self._truncation.truncated_energy
 
     @property
     def verdict(self) -> tuple[float, float]:
         """See ``Segments``."""
-        share, error = self._sums[a.VERDICT - a.WORKS :].tolist()
-        return share, error
+        return self._truncation.energy_share, self._truncation.motion
 
-    @functools.cached_property
+    @property
     def starts(self) -> np.ndarray:
         """See ``Segments``."""
-        return self._record.instants[: self._count]
+        return self._record.instants[:-1]
 
-    @functools.cached_property
+    @property
     def ends(self) -> np.ndarray:
         """See ``Segments``."""
-        return self._record.instants[1 : self._count + 1]
+        return self._record.instants[1:]
 
-    @functools.cached_property
+    @property
     def numbers(self) -> np.ndarray:
         """See ``Segments``."""
-        return self._record.rows[: self._count, 0]
+        return self._record.level_numbers
 
     @property
     def settled(self) -> np.ndarray:
         """See ``Segments``."""
-        return np.asarray(self._record.rows[: self._count, 3] < 0)
+        return self._record.settled
 
     @property
     def levels(self) -> Sequence[LoadedLevel]:
@@ -145,69 +140,55 @@ class Recorded(LazySequence[Segment], Segments):
         moved = (terms * response.basis.integrals((ends - starts)[:, None])).real.sum()
         return float(moved + (row[-1] + x[:, r:] @ row[r:n]) @ (ends - starts))
 
-    @property
-    def works(self) -> tuple[float, float, float]:
-        """See ``Segments``."""
-        damping, varying, friction = self._sums[:3].tolist()
-        return self._completed if self._left_out else (damping, varying, friction)
-
     @functools.cached_property
-    def _completed(self) -> tuple[float, float, float]:
-        """The works, those of the segments that were left out included."""
-        damping, varying, friction = self._sums[:3].tolist()
-        further = self._record.works(self._record.left_out[: self._left_out])
-        return damping + further[0], varying + further[1], friction + further[2]
+    def works(self) -> tuple[float, float, float]:
+        """See ``Segments``; those that the run has left out are computed now."""
+        further = self._record.works(self._record.left_out) if len(self._record.left_out) else (0.0, 0.0, 0.0)
+        return (
+            self._works.damping + further[0],
+            self._works.varying + further[1],
+            self._works.friction + further[2],
+        )
 
 
 class Events(LazySequence[Event]):
-    """The events of a record so far; lost (6,): energies [J] lost at all of them."""
+    """The events of a record so far."""
 
-    def __init__(self, record: Record, lost: np.ndarray) -> None:
-        self._count, self._made = record.event_count, {}
-        self._record, self._lost = record, lost
+    def __init__(self, record: Record) -> None:
+        self._count, self._made = len(record.event_rows), {}
+        self._record = record
 
     @property
     def loss(self) -> Loss:
         """Energies [J] lost at all events."""
-        return Loss(*self._lost.tolist())
+        return Loss(*self._record.losses.sum(axis=0).tolist())
 
     def impulse(self, contact: str, first: float, last: float) -> float:
         """Impulse [N s] on a contact in [first, last] [s], impacts of other contacts included."""
-        names, times = [name for name, _ in self._record.contact_states], self._record.amounts[:, 0]
-        is_impact = (self._record.kinds[:, 0] == names.index(contact)) & (times >= first) & (times <= last)
-        return float(self._impulses[is_impact].sum())
+        record, names = self._record, [name for name, _ in self._record.contact_states]
+        within = (record.elements == names.index(contact)) & (record.times >= first) & (record.times <= last)
+        return float(record.impulses[within].sum())
 
     def table(self) -> np.ndarray:
         """Time [s], position of the contact, impulse [N s] and energy lost to truncation [J] of every event, (k, 4)."""
-        places, amounts = self._record.event_rows, self._record.amounts
-        time, truncation = amounts[places, 0], amounts[places, 1] + amounts[places, 2]
-        return np.column_stack([time, self._record.kinds[places, 0], self._impulses[places], truncation])
-
-    @property
-    def _impulses(self) -> np.ndarray:
-        """Impulse [N s] of every row of kinds (m,)."""
-        impulses = np.zeros(len(self._record.kinds))
-        impulses[self._record.struck] = self._record.impacts[:, 0]
-        return impulses
-
-    def _impact(self, place: int) -> list[float]:
-        """The row of impacts that belongs to a row of kinds, zeros where there is none."""
-        struck = self._record.struck
-        k = bisect.bisect_left(struck, place)
-        if k == len(struck) or struck[k] != place:
-            return [0.0] * a.IMPACT_WIDTH
-        row: list[float] = self._record.impacts[k].tolist()
-        return row
+        record, rows = self._record, self._record.event_rows
+        truncation = record.losses[rows, 1] + record.losses[rows, 2]
+        return np.column_stack([record.times[rows], record.elements[rows], record.impulses[rows], truncation])
 
     def _make(self, i: int) -> Event:
         """The i-th event."""
         record, contacts = self._record, self._record.contact_states
-        place = int(record.event_rows[i])
+        row = int(record.event_rows[i])
         before = int(record.event_rows[i - 1]) + 1 if i else 0
-        time, kinetic, strain = record.amounts[place].tolist()
-        impulse, impact, stop_work, damping, friction = self._impact(place)
-        contact, entered, left = record.kinds[place].tolist()
-        shared = tuple((contacts[record.kinds[k, 0]][0], self._impact(k)[0]) for k in range(before, place))
-        name, states = contacts[contact]
-        kind, loss = event_kind(states, left, entered), Loss(impact, kinetic, strain, stop_work, damping, friction)
-        return Event(time, name, kind, loss, impulse, shared, states[entered].name)
+        shared = tuple(
+            (contacts[element][0], impulse)
+            for element, impulse in zip(
+                record.elements[before:row].tolist(), record.impulses[before:row].tolist(), strict=True
+            )
+        )
+        name, states = contacts[int(record.elements[row])]
+        entered, left = int(record.entered[row]), int(record.left[row])
+        kind, loss = event_kind(states, left, entered), Loss(*record.losses[row].tolist())
+        return Event(
+            float(record.times[row]), name, kind, loss, float(record.impulses[row]), shared, states[entered].name
+        )

@@ -10,7 +10,7 @@ impact has stopped. The difference to the truncated state after it is the defect
 in the displacement norm of the mass matrix: w / Omega is the displacement that a lost velocity would have become in the
 open level, to which it comes back. At the start it is the static residual of the starting configuration. From level to
 level d and w / Omega are linear in the state before and in the changes beside the map of the levels
-(events/defect_forms.py); the triangular factors of these maps are kept, a few numbers per pair of levels.
+(transitions/defect_forms.py); the triangular factors of these maps are kept, a few numbers per pair of levels.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn._core import indicator
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.defect_forms import allowed, defect_form, held_rigidly, over_omega
 from multiphi_exudyn.events.transitions.state import event_table
 from multiphi_exudyn.events.transitions.transition import Transition
-from multiphi_exudyn.time.loop.verdict import indicator
 from multiphi_exudyn.time.segments.segment import Segments
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 

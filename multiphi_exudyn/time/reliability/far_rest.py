@@ -19,6 +19,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg.blas import dnrm2
 
 from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
@@ -58,7 +59,7 @@ class FarRest:
             return
         times = np.linspace(trajectory.t_start, trajectory.t_end, SAMPLES)
         places = trajectory.model.base.coordinates(trajectory.displacement(times))
-        size = max(round_off, float(np.linalg.norm(places)) / math.sqrt(SAMPLES))
+        size = max(round_off, float(dnrm2(places.ravel())) / math.sqrt(SAMPLES))  # does not overflow
         if round_off > LOST * size:
             more = f", and more where its {events} events enlarge it" if events else ""
             yield (

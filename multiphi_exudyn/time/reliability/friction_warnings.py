@@ -1,16 +1,16 @@
 """Friction warnings: redundant contacts and friction, friction decided in turn, slip that truncation turns backwards.
 
-Of rigid contacts whose directions depend linearly on each other an independent set carries the load (events/law). How
+Of rigid contacts whose directions depend linearly on each other an independent set carries the load (core/law). How
 they share it is not unique, and if they rub differently neither is the motion.
 
 Friction without a spring whose row depends linearly on those of sticking friction beside it moves with that friction:
-its force is its kinetic limit, as in slip (events/law). Where one of them has a higher static limit, that one bears
+its force is its kinetic limit, as in slip (core/law). Where one of them has a higher static limit, that one bears
 the load. Where several have, or where one has begun to slip and others stick for it, neither the distribution of the
 load nor the begin of slip is determined: two of equal limits F and static limits S slip at S + F here, and might at
 2 S. Nor is it at compliant contacts, whose limits change with their normal forces. Friction at rigid contacts is
 decided one contact after the other: where several change direction at one instant, their order may matter.
 
-With a truncated basis friction in slip may have a speed s (h_t.x' - v_t - T'/k_t) < 0 against its slip (events/law):
+With a truncated basis friction in slip may have a speed s (h_t.x' - v_t - T'/k_t) < 0 against its slip (core/law):
 the modes of slip and those of stick do not move its place alike. There is a warning and no correction. The static
 residual of the modes left out, which corrects friction of constant limits, would follow the normal force here: a force
 that moves no mass and follows N' is not symmetric, and may create energy. More modes are the remedy.

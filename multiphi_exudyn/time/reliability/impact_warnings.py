@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.display import per_cent
-from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import event_table
 from multiphi_exudyn.levels.model.model import MultiPhiModel
@@ -50,16 +50,16 @@ def spread_contacts(model: MultiPhiModel) -> tuple[str, ...]:
     return tuple(names)
 
 
-def is_taking(numbers: np.ndarray) -> bool:
-    """Whether the numbers of a run (events/arrays.py) let impacts take more than TAKEN of the largest energy."""
-    start = abs(numbers[a.GIVEN_ENERGY] + numbers[a.GIVEN_POTENTIAL])
-    return bool(numbers[a.LOST_AT_START + a.BY_IMPACT] + numbers[a.LOST_SO_FAR + a.BY_IMPACT] > TAKEN * start)
+def is_taking(ledger: core.Ledger) -> bool:
+    """Whether impacts may have taken more than TAKEN of the largest energy of a run."""
+    start = abs(ledger.start_energy + ledger.start_potential)
+    return bool(ledger.at_start[0] + ledger.at_events[0] > TAKEN * start)
 
 
 def mesh_warnings(trajectory: Trajectory, spread: Sequence[str]) -> Iterator[str]:
     """At most one sentence on a run whose impacts took energy; spread: see ``spread_contacts``."""
     record, index = trajectory.ending.record, trajectory.model.index
-    contacts, impulses, lost = record.kinds[record.struck, 0], record.impacts[:, 0], record.impacts[:, 1]
+    contacts, impulses, lost = record.elements, record.impulses, record.losses[:, 0]
     struck, losses = (np.bincount(contacts, amounts, len(trajectory.model.contacts)) for amounts in (impulses, lost))
     names = [name for name in spread if struck[index(name)] > 0]
     if not names:

@@ -17,8 +17,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from multiphi_exudyn._core import OPEN_LEDGER as OPEN
 from multiphi_exudyn.display import per_cent
-from multiphi_exudyn.time.loop.verdict import OPEN
 from multiphi_exudyn.time.trajectory.ledger import Ledger
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 

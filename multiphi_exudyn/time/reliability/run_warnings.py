@@ -43,14 +43,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from multiphi_exudyn._core import lost_share
 from multiphi_exudyn.display import per_cent
-from multiphi_exudyn.events.arrays import BALANCED
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.model.mode_choice import Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.time.loop.verdict import lost_share
 from multiphi_exudyn.time.reliability.far_rest import FarRest
 from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
 from multiphi_exudyn.time.reliability.impact_warnings import impact_warnings, is_taking, mesh_warnings, spread_contacts
@@ -87,7 +86,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     the model's own check needs the motion of every run.
     """
     record, model = trajectory.ending.record, trajectory.model
-    visited, cache = record.visited, record.arrays.levels.told
+    visited, cache = record.visited, record.loaded.told
     if not visited:
         return ()
     begun = trajectory.start.states
@@ -95,16 +94,16 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
     entry = cache.find(key)
     if entry is None:
         general = ModelWarnings.of(model, trajectory.segments)
-        first = record.arrays.levels.kept(begun)  # a run may leave it at once, so that it has no segment there
+        first = record.loaded.kept(begun)  # a run may leave it at once, so that it has no segment there
         passed = [*trajectory.segments.levels, *([] if begun in visited or first is None else [first])]
         entry = general, FarRest.of(passed), *general.for_run(trajectory)
         if not general.needs_motion:
             cache.keep(key, entry)
     general, rest, before, after = entry
     after = (*after, *rest.warnings(trajectory))
-    if trajectory.ending.numbers[BALANCED] != 1.0 or record.left_out_count:
+    if not trajectory.ending.ledger.is_balanced or len(record.left_out):
         before = (*ledger_warnings(trajectory), *before)
-    if general.spread and is_taking(trajectory.ending.numbers):
+    if general.spread and is_taking(trajectory.ending.ledger):
         after = (*mesh_warnings(trajectory, general.spread), *after)
     share, error = trajectory.segments.verdict
     if tolerance is not None or not (share >= 0 and error >= 0):
@@ -220,7 +219,7 @@ def _slow(trajectory: Trajectory, fastest: float) -> Iterator[str]:
 
 def _struck(trajectory: Trajectory) -> bool:
     """Whether a rigid contact was struck."""
-    return bool(np.any(trajectory.ending.record.impacts[:, 0] > 0))
+    return bool(np.any(trajectory.ending.record.impulses > 0))
 
 
 def _slow_mode(trajectory: Trajectory, slowest: float) -> Iterator[str]:

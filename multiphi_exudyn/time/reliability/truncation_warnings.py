@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import math
 
 import numpy as np
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.display import per_cent
-from multiphi_exudyn.events import arrays as a
 from multiphi_exudyn.levels.model.mode_choice import Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.time.loop.motion_size import INDICATOR, SAMPLES
-from multiphi_exudyn.time.loop.verdict import set_verdict
 from multiphi_exudyn.time.reliability.defects import total_defect
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 from multiphi_exudyn.time.warnings.model_warnings import REMEDY
 
 __all__ = ["CHANGE", "energy_warning", "indicator_threshold", "truncation_warnings", "verdict_of"]
 
+INDICATOR = core.MOTION_THRESHOLD
 CHANGE = "change"  # entry of a model: the last change by more modes, where it exceeds what a Tolerance allows
 TEXTS = 64  # verdicts whose sentences are kept
 RIGID_INDICATOR = 0.05  # threshold where a rigid contact is struck: impacts raise the indicator more than the error
@@ -36,17 +36,15 @@ def verdict_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tu
     """
     if trajectory.model.whole:
         return 0.0, 0.0
-    limit = indicator_threshold(tolerance)
-    numbers, isolated = trajectory.ending.numbers.copy(), int(trajectory.ending.record.arrays.levels.isolated)
-    numbers[a.DEFECTS] = total_defect(trajectory)
-    numbers[a.GIVEN_SQUARE] = numbers[a.GIVEN_SQUARE] or np.sum(trajectory.start.displacement**2)
-    set_verdict(numbers, isolated, limit, trajectory.t_end)
-    if np.isnan(numbers[a.VERDICT : a.VERDICT + 2]).any():
-        numbers[a.LOOKED : a.LOOKED + a.LOOK_WIDTH] = SAMPLES, *trajectory.segments.sizes(trajectory.t_end)
-        numbers[a.LOOK_END] = trajectory.t_end
-        set_verdict(numbers, isolated, limit, trajectory.t_end)
-    share, error = numbers[a.VERDICT : a.VERDICT + 2].tolist()
-    return share, error
+    limit, ledger = indicator_threshold(tolerance), trajectory.ending.ledger
+    found = copy.copy(trajectory.ending.record.trajectory.truncation)
+    found.defects = total_defect(trajectory)
+    found.start_square = found.start_square or float(np.sum(trajectory.start.displacement**2))
+    found.estimate(ledger, limit)
+    if math.isnan(found.energy_share) or math.isnan(found.motion):
+        found.mean_square, found.largest_energy = trajectory.segments.sizes(trajectory.t_end)
+        found.estimate(ledger, limit)
+    return found.energy_share, found.motion
 
 
 def truncation_warnings(

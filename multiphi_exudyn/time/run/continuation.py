@@ -17,9 +17,9 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.packing.start_arrays import Start
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.transitions.state import State
+from multiphi_exudyn.time.start_conditions import Start
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
 __all__ = ["continued_start", "stop_displacements", "with_final_velocity"]

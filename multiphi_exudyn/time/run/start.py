@@ -13,17 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.events.arrays import CLOSE, IDLE, OPEN, SLIP_FORWARD
-from multiphi_exudyn.events.packing.start_arrays import Start
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT, drop_round_off
 from multiphi_exudyn.mechanics.elements.element import friction_spring
 from multiphi_exudyn.time.run.start_projection import StartProjection
+from multiphi_exudyn.time.start_conditions import Start
 
 __all__ = ["first_start"]
 
+OPEN, CLOSED = 0, 1  # states of a contact
+SLIP_FORWARD, IDLE = 1, 3  # of friction, after stick; the latter of contacts that are not rigid
 TOUCHING = 1e-9  # of the gap and of the terms of it: a smaller gap touches
 CONTINUED = 1e-12  # of the possible size of the motion: a smaller gap is round-off at the start of a continued run
 NO_PLACES = np.zeros(0)  # held places of a start without friction
@@ -78,11 +79,10 @@ def first_start(
     displacement: np.ndarray | None,
     velocity: np.ndarray | None,
     rest: Equilibrium | None = None,
-    compiled: bool | None = None,
 ) -> Start:
     """Start of a run to ``end`` [s] from x, x' (n,), None for zero, with the first states of the contacts.
 
-    rest: equilibrium in whose place x is, with the springs of friction stretched. compiled: False for plain Python.
+    rest: equilibrium in whose place x is, with the springs of friction stretched.
     """
     base, vector = levels.model.base, levels.model.structure.vector
     scales: _Scales = levels.starts.get_or_build(end, lambda: _Scales.of(levels, end))
@@ -90,7 +90,7 @@ def first_start(
     known = None if rest is None or velocity is not None else rest.coordinates(base)
     if known is not None:
         y, v = known, np.zeros(len(known))
-        far = projection is not None and projection.is_far_at_rest(y, compiled)
+        far = projection is not None and projection.is_far_at_rest(y)
     else:
         given = displacement if rest is None else rest.displacement
         x = None if given is None else vector("displacement", given)
@@ -98,7 +98,7 @@ def first_start(
         if projection is None:
             y, v = [np.zeros(len(scales.times)) if each is None else base.coordinates(each) for each in (x, x_t)]
         else:
-            y, v, far = projection.coordinates(x, x_t, compiled)
+            y, v, far = projection.coordinates(x, x_t)
     if far and scales.apart is not None:
         return Start(y, v, (), (), scales.stops, scales.apart, NO_PLACES)
     moving = v * scales.times
@@ -129,7 +129,7 @@ def _in_touch(
         first_state = contact.first_state(depth, *rates[list(model.link_indices[i])].tolist())
         states[i] = [state.name for state in contact.states].index(first_state)
         if contact.rigid and not contact.held and gaps[i] <= near[i]:
-            states[i] = CLOSE
+            states[i] = CLOSED
     states = _independent(model, states)
     touching = tuple(i for i, c in enumerate(model.contacts) if c.rigid and not c.held and states[i] != OPEN)
     held = np.array([gaps[i] - stretches.get(model.links[i].name, 0.0) for i in model.held])

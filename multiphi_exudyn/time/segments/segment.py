@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from multiphi_exudyn._core import MOTION_SAMPLES as SAMPLES
 from multiphi_exudyn.display import Shown
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import Phase
-from multiphi_exudyn.mathematics.response.exponentials import Exponentials
-from multiphi_exudyn.time.loop.motion_size import SAMPLES
+from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.time.segments.quadrature import panels, works
 from multiphi_exudyn.time.segments.segment_flow import Flow
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.display import Shown
-from multiphi_exudyn.events.arrays import BY_IMPACT, DAMPING, FRICTION, KINETIC, STOP_WORK, STRAIN
+from multiphi_exudyn.events.transitions.state import Loss
 
 __all__ = ["Ledger", "Statistics", "ledger_of"]
 
@@ -97,21 +98,21 @@ class Ledger(Shown):
 
 
 def ledger_of(
-    sums: Sequence[float], works: tuple[float, float, float], static: float, initial: float, final: float
+    kept: core.Ledger, works: tuple[float, float, float], static: float, initial: float, final: float
 ) -> Ledger:
-    """The ledger of the numbers (13,) of a run from LOST_AT_START to WORK (events/arrays.py).
+    """The ledger of a run from the numbers that the core has kept.
 
     works [J]: of damping, varying loads and friction, of all segments. static: work [J] of constant loads.
     """
-    impact, kinetic, strain, stopped, damping, friction, *lost, work = sums
     damped, varying, rubbed = works
+    lost = Loss(*kept.at_start) + Loss(*kept.at_events)
     return Ledger(
         initial=initial,
-        work_of_loads=static + (stopped + lost[STOP_WORK]) + varying + work,
-        impact=impact + lost[BY_IMPACT],
-        truncation_kinetic=kinetic + lost[KINETIC],
-        truncation_strain=strain + lost[STRAIN],
-        damping=damping + lost[DAMPING] + damped,
-        friction=friction + lost[FRICTION] + rubbed,
+        work_of_loads=static + lost.stop_work + varying + kept.load_work,
+        impact=lost.impact,
+        truncation_kinetic=lost.truncation_kinetic,
+        truncation_strain=lost.truncation_strain,
+        damping=lost.damping + damped,
+        friction=lost.friction + rubbed,
         final=final,
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from multiphi_exudyn.events.excitation.loaded_level import StrainForm
 from multiphi_exudyn.events.transitions.state import Event, Loss
-from multiphi_exudyn.mathematics.response.exponentials import Exponentials
+from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.time.segments.segment import Segment
 from multiphi_exudyn.time.segments.segment_flow import Flow
 from multiphi_exudyn.time.trajectory.histories import Histories

@@ -20,12 +20,12 @@ import numpy as np
 
 from multiphi_exudyn.display import kinds, names
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.events.packing.start_arrays import Start
 from multiphi_exudyn.events.transitions.exits import exits_of
 from multiphi_exudyn.events.transitions.state import Event, Loss, Phase, State, event_table
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.structures.arguments import is_real
 from multiphi_exudyn.time.segments.segment import Segments
+from multiphi_exudyn.time.start_conditions import Start
 from multiphi_exudyn.time.trajectory.final_state import FinalState
 from multiphi_exudyn.time.trajectory.histories import INSTANTS
 from multiphi_exudyn.time.trajectory.ledger import Ledger, Statistics, ledger_of
@@ -171,7 +171,7 @@ class Trajectory(ModelHistories):
         if not self.segments:
             raise NumericalFailure(f"ledger: got a run without motion ({self.message}), need one that has started")
         ending = self.ending
-        return ledger_of(ending.sums, self.segments.works, self._static_work, self.initial_energy, ending.energy)
+        return ledger_of(ending.ledger, self.segments.works, self._static_work, self.initial_energy, ending.energy)
 
     @property
     def _static_work(self) -> float:

@@ -1,6 +1,6 @@
 """Certified test that no event occurs within a time step, from the states at its two ends.
 
-For the signal s of an exit (events/law) the cubic Hermite interpolant of s, s' at both ends has an error of at
+For the signal s of an exit (core/law) the cubic Hermite interpolant of s, s' at both ends has an error of at
 most h^4/384 max|s''''|, and it is not less than the smallest of its Bernstein coefficients: s > 0 on the whole step if
 
     min(s0, s0 + h s0'/3, s1 - h s1'/3, s1) > h^4/384 |[P R] A^3 S^-1| max |S z'| exp(sigma h)
@@ -20,8 +20,8 @@ Under loads that vary, s depends on xi = (eta, w), and linear interpolation has 
 p = P w + Q w' is the modal force. The bounds of the channels hold for the whole run; a kink of a sampled time function
 counts as the second derivative 2 |jump of w'| / h. A step in which a time function itself jumps always fails the test.
 
-Both conditions are a matrix times x = (q, q', q'', 1, f, stick positions, w, w') at the ends. Exudyn's own state is
-read without a copy.
+Both conditions are a matrix times x = (q, q', q'', 1, f, stick positions, w, w') at the ends. The core tests them
+(core/step_test.hpp) and reads Exudyn's own state without a copy.
 """
 
 from __future__ import annotations
@@ -32,82 +32,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import Row
 from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
-from multiphi_exudyn.mathematics.compiling.compiled import Ints, Numbers, compiled, entry
 from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
-from multiphi_exudyn.mathematics.search.signal_bounds import HERMITE
 
-__all__ = ["Conditions", "StepTest", "conditions_of", "jump_times"]
+__all__ = ["Conditions", "conditions_of", "jump_times", "step_test"]
 
 NEGLIGIBLE = float(np.finfo(float).eps)  # of a signal: smaller values count as zero
-
-TIME, STEP, ROUNDING, CLEARANCE, SPEED, ANNOUNCED_END = range(6)  # numbers
-SIZE, POINTS, HELD, CHANNELS, FIRST_AHEAD, BEHIND_COUNT, CONDITION_COUNT, HAS_POINT_FORCES = range(8)  # ints
-START, END, MATRIX, NORM, MULTIPLIERS = range(8, 13)  # ints
-
-
-@compiled
-def step_is_clear(
-    q: Numbers, q_t: Numbers, q_tt: Numbers, multipliers: Numbers, ints: Ints, numbers: Numbers, t: float
-) -> int:
-    """1 if no event can have occurred in the step that ends at t [s]; its end is then the start of the next step."""
-    ends = abs(t - numbers[TIME] - numbers[STEP]) <= numbers[ROUNDING]
-    if not ends or (ints[CHANNELS] > 0 and numbers[ANNOUNCED_END] != t):
-        return 0
-    s, x = ints[SIZE], ints[END]
-    for i in range(s):
-        numbers[x + i] = q[i]
-        numbers[x + s + i] = q_t[i]
-        numbers[x + 2 * s + i] = q_tt[i]
-    for k in range(ints[POINTS]):
-        numbers[x + 3 * s + 1 + k] = multipliers[ints[ints[MULTIPLIERS] + k]]
-    width, square, row = 3 * s + 1 + ints[POINTS] + ints[HELD] + ints[CHANNELS], 0.0, ints[NORM]
-    for _ in range(2 * s):
-        total = 0.0
-        for i in range(3 * s):
-            total += numbers[row + i] * numbers[x + i]
-        square += total * total
-        row += 3 * s
-    speed = math.sqrt(square)
-    limit = max(speed, numbers[SPEED])
-    if ints[HAS_POINT_FORCES] == 1:
-        limit += half_change(ints, numbers, width)
-    if not numbers[CLEARANCE] > limit:
-        return 0
-    clearance, row = math.inf, ints[MATRIX]
-    for k in range(ints[CONDITION_COUNT]):
-        total = 0.0
-        for i in range(width):
-            total += numbers[row + i] * numbers[x + i]
-        if k < ints[BEHIND_COUNT] and not total > limit:
-            return 0
-        if k >= ints[FIRST_AHEAD]:
-            clearance = min(clearance, total)
-        row += width
-    ints[END] = ints[START]
-    ints[START] = x
-    numbers[TIME] = t
-    numbers[CLEARANCE] = clearance
-    numbers[SPEED] = speed
-    return 1
-
-
-@compiled
-def half_change(ints: Ints, numbers: Numbers, width: int) -> float:
-    """Largest difference of L f between its mean and either end of a step, in units of the conditions."""
-    first, largest = 3 * ints[SIZE] + 1, 0.0
-    for k in range(ints[CONDITION_COUNT]):
-        row, total = ints[MATRIX] + k * width, 0.0
-        for i in range(first, first + ints[POINTS]):
-            total += numbers[row + i] * (numbers[ints[END] + i] - numbers[ints[START] + i])
-        largest = max(largest, 0.5 * abs(total))
-    return largest
-
-
-step_test = entry(step_is_clear)
 
 
 @dataclass(frozen=True)
@@ -129,62 +63,28 @@ class Conditions:
     has_point_forces: bool
 
 
-class StepTest:
-    """The test in one level, for steps of length ``step`` [s]; ``is_step_clear(t)`` is called at the end of each.
+def step_test(
+    conditions: Conditions, step: float, rounding: float, views: Sequence[np.ndarray], point_forces: Sequence[int]
+) -> core.StepTest:
+    """Return the test for steps of length ``step`` [s] in one level; its ``is_step_clear(t)`` ends each of them.
 
-    views: q, q', q'' (s,) in the system's current state, and all its multipliers. indices: of f among the multipliers.
+    views: q, q', q'' (s,) in the system's current state, and all its multipliers. point_forces: indices of f among the
+    multipliers.
     """
-
-    def __init__(
-        self,
-        conditions: Conditions,
-        step: float,
-        rounding: float,
-        views: Sequence[np.ndarray],
-        indices: Sequence[int],
-    ) -> None:
-        parts = conditions.behind, conditions.both, conditions.ahead
-        self._matrix, self._norm = np.vstack(parts), conditions.norm
-        behind, both, _ = (len(part) for part in parts)
-        self._first_ahead, size, (count, width) = behind, conditions.norm.shape[1] // 3, self._matrix.shape
-        first = ANNOUNCED_END + 1
-        self._width, matrix = width, first + 2 * width
-        self._numbers = np.concatenate([np.zeros(matrix), self._matrix.ravel(), self._norm.ravel()])
-        self._numbers[[STEP, ROUNDING, TIME]] = step, rounding, math.nan
-        self._numbers[[first + 3 * size, first + width + 3 * size]] = 1.0
-        entries = conditions.points, conditions.held, conditions.channels
-        sizes = size, *entries, behind, behind + both, count, int(conditions.has_point_forces)
-        starts = first, first + width, matrix, matrix + count * width, MULTIPLIERS + 1
-        self._ints = np.array([*sizes, *starts, *indices], dtype=np.int64)
-        self._views = tuple(views)
-        self.is_step_clear = step_test.bound(*views, self._ints, self._numbers)
-
-    @property
-    def time(self) -> float:
-        """Start of the present step [s]."""
-        return float(self._numbers[TIME])
-
-    @property
-    def start(self) -> np.ndarray:
-        """A copy of (q, q', q'', 1, f) at the start of the present step."""
-        first = self._ints[START]
-        return self._numbers[first : first + 3 * self._ints[SIZE] + 1 + self._ints[POINTS]].copy()
-
-    def begin(self, time: float, x: np.ndarray, armed: bool) -> None:
-        """Begin a step at a time [s] with x; while a phase is not armed the test fails, so that its end is found."""
-        first, end, numbers = self._ints[START], self._ints[END], self._numbers
-        numbers[first : first + self._width] = x
-        unchanged = slice(3 * self._ints[SIZE] + 1 + self._ints[POINTS], self._width - self._ints[CHANNELS])
-        numbers[end + unchanged.start : end + unchanged.stop] = x[unchanged]
-        speed = self._norm.dot(x[: self._norm.shape[1]])
-        clearance = np.min(self._matrix[self._first_ahead :].dot(x), initial=math.inf) if armed else -math.inf
-        numbers[TIME], numbers[CLEARANCE], numbers[SPEED] = time, clearance, math.sqrt(speed.dot(speed))
-
-    def set_end_channels(self, t: float, channels: np.ndarray) -> None:
-        """Set w, w' (2 q,) at the end t [s] of the present step; not to be called for a step in which they jump."""
-        first = self._ints[END] + self._width
-        self._numbers[first - len(channels) : first] = channels
-        self._numbers[ANNOUNCED_END] = t
+    parts = conditions.behind, conditions.both, conditions.ahead
+    behind, both, _ = (len(part) for part in parts)
+    rows = core.StepConditions(
+        rows=np.vstack(parts),
+        end_count=behind + both,
+        first_at_start=behind,
+        norm=conditions.norm,
+        points=conditions.points,
+        held=conditions.held,
+        channels=conditions.channels,
+        has_point_forces=conditions.has_point_forces,
+    )
+    q, q_t, q_tt, multipliers = views
+    return core.StepTest(rows, step, rounding, q, q_t, q_tt, multipliers, point_forces)
 
 
 def conditions_of(
@@ -200,7 +100,7 @@ def conditions_of(
         np.split(part, [s + q], axis=1) for part in _signal_matrices(stepped, rows, level.excitation.channels)
     )
     modal_position, modal_rate, none = position[:, :s], rate[:, :s], np.zeros((len(rows), s))
-    order, factor = (1, step**2 / 8) if q else (3, HERMITE * step**4)
+    order, factor = (1, step**2 / 8) if q else (3, core.CUBIC_REMAINDER * step**4)
     derivative_bounds, growth = _derivative_bounds(stepped, modal_position, modal_rate, order), _growth(stepped, step)
     constants = np.array([row.constant for row in rows]).reshape(-1)
     scales = np.maximum(factor * derivative_bounds, _round_off_bound(position, rate, constants, step)) * growth

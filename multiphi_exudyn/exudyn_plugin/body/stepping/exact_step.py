@@ -1,4 +1,4 @@
-"""Exact step: a step of the solver computed again by the loop of ``simulate``, from event to event.
+"""Exact step: a step of the solver computed again by the core, from event to event.
 
     before the first event   the mean of the forces at both ends of the step, transformed to the modes of each level
     after it                 the same, plus the change of reactions, loads, connectors and inertia at the event

@@ -1,7 +1,7 @@
 """Step by step: one run of a body that is coupled to other items of the system, or acted on by them.
 
 After every step a certified test (certified_step.py) shows that no event can have occurred in it. Where the test fails,
-the loop of ``simulate`` computes the step again from its start (exact_step.py), with the mean force of the step held
+the core computes the step again from its start (exact_step.py), with the mean force of the step held
 constant. If an event occurred, its result replaces Exudyn's coordinates, matrices and level. The accelerations that are
 written belong to the forces of loads and connectors in the new level.
 """
@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.events.transitions.state import Event, Phase, State
 from multiphi_exudyn.exudyn_plugin.body.solver.switching import bodies_of
 from multiphi_exudyn.exudyn_plugin.body.state.coordinates import SAME_STEP
 from multiphi_exudyn.exudyn_plugin.body.state.run_record import RunRecord
-from multiphi_exudyn.exudyn_plugin.body.stepping.certified_step import StepTest
+from multiphi_exudyn.exudyn_plugin.body.stepping.certified_step import step_test
 from multiphi_exudyn.exudyn_plugin.body.stepping.exact_step import BodyInStep, Step, exact_step
 from multiphi_exudyn.exudyn_plugin.body.stepping.own_loads import OwnLoads
 from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import ExactMotion
@@ -48,7 +49,7 @@ class StepwiseRun:
         self.running, self.state = True, state
         self._body, self._loads, self._motion, self._record = body, loads, motion, record
         self._announced_end, self._largest_energy = time, 0.0
-        self._tests = BoundedCache[tuple[int, ...], StepTest](body.model.most_levels)
+        self._tests = BoundedCache[tuple[int, ...], core.StepTest](body.model.most_levels)
         self._prepare(step)
         self._begin(time, body.coordinates.copy_state())
 
@@ -173,12 +174,12 @@ class StepwiseRun:
         self._prepare_spans()
         self._test = self._tests.get_or_build(self.state.states, self._new_test)
 
-    def _new_test(self) -> StepTest:
+    def _new_test(self) -> core.StepTest:
         coordinates = self._body.coordinates
         indices = [] if coordinates.interface is None else coordinates.interface.multipliers.tolist()
         conditions = self._loads.conditions(
             coordinates.stepped, self._step_size, coordinates.direct_reactions(coordinates.stepped)
         )
-        return StepTest(
+        return step_test(
             conditions, self._step_size, self._rounding, (*coordinates.views, coordinates.multipliers), indices
         )
