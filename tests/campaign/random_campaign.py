@@ -238,6 +238,8 @@ def differences(found):
         for case in sorted(set(expected) & set(digests)):
             if text := _differs(expected[case], digests[case]):
                 kind, number = case.split("/")
+                if kind == "at events" and not text.startswith(("status", "answers")):
+                    continue  # its start is an instant of a run: round-off decides whether its event is still to come
                 excuse = "" if text.startswith("status") else _excuse(kind, int(number))
                 lines.append(f"{kind} {number}  {first} and {name}: {text}{excuse}")
     return lines
