@@ -3,7 +3,7 @@
 //     rows x > max |S z'|,   x = (q, q', q'', 1, f, stick positions, w, w'),   S z' = norm (q, q', q'')
 //
 // Each row is a Bernstein coefficient of a signal's cubic interpolant, or a value of a signal, divided by the factor of
-// |S z'| in the bound of what the interpolant leaves out (exudyn_plugin/body/stepping/certified_step.py computes them).
+// |S z'| in the bound of what the interpolant leaves out (exudyn_plugin/step_test.py computes them).
 // The test may fail without an event, but it never passes with one.
 #pragma once
 

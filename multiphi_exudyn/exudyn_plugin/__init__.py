@@ -3,25 +3,23 @@
 On import the Create function is also bound to Exudyn's systems, as ``mbs.CreateMultiPhiBody(...)``, and SolveDynamic
 checks what the bodies need of the solver.
 
-Order: convert, coupling, body.
+Order: items, system, contacts, timed, matrices, start_state, linear_range, linearize, fem_interface, reduce,
+discretised_level, interface, attached, state, step_test, solver, coupled, alone, body, sensors, drawing, create.
 """
 
 from __future__ import annotations
 
-from multiphi_exudyn.exudyn_plugin.body.binding import bind
-from multiphi_exudyn.exudyn_plugin.body.body import MultiPhiBody
-from multiphi_exudyn.exudyn_plugin.body.create import CreateMultiPhiBody
-from multiphi_exudyn.exudyn_plugin.body.results.drawing import Drawing
-from multiphi_exudyn.exudyn_plugin.body.results.sensors import BodyHistories, body_histories
-from multiphi_exudyn.exudyn_plugin.body.solver.solving import install_checks
-from multiphi_exudyn.exudyn_plugin.convert.items.items import Item
-from multiphi_exudyn.exudyn_plugin.convert.linear_range.range_check import RangeCheck
-from multiphi_exudyn.exudyn_plugin.convert.reduce import reduce
-from multiphi_exudyn.exudyn_plugin.convert.reduction import Reduction
-from multiphi_exudyn.exudyn_plugin.convert.structure.fem_interface import linear_structure_from_fem
-from multiphi_exudyn.exudyn_plugin.convert.structure.linearize import linear_structure_from
-from multiphi_exudyn.exudyn_plugin.convert.structure.linearized_structure import LinearizedStructure
-from multiphi_exudyn.exudyn_plugin.coupling.interface_nodes import PositionInterface, RigidInterface
+from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
+from multiphi_exudyn.exudyn_plugin.create import CreateMultiPhiBody
+from multiphi_exudyn.exudyn_plugin.drawing import Drawing
+from multiphi_exudyn.exudyn_plugin.fem_interface import linear_structure_from_fem
+from multiphi_exudyn.exudyn_plugin.interface import PositionInterface, RigidInterface
+from multiphi_exudyn.exudyn_plugin.items import Item
+from multiphi_exudyn.exudyn_plugin.linear_range import RangeCheck
+from multiphi_exudyn.exudyn_plugin.linearize import LinearizedStructure, linear_structure_from
+from multiphi_exudyn.exudyn_plugin.reduce import Reduction, reduce
+from multiphi_exudyn.exudyn_plugin.sensors import BodyHistories, body_histories
+from multiphi_exudyn.exudyn_plugin.solver import bind, install_checks
 
 __all__ = [
     "BodyHistories",

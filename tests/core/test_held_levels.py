@@ -12,7 +12,7 @@ from small_structures import chain
 import multiphi_exudyn as mp
 import multiphi_exudyn._core as core
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.exudyn_plugin.coupling.interface import _direct_reactions
+from multiphi_exudyn.exudyn_plugin.interface import _direct_reactions
 from multiphi_exudyn.levels.core_model import core_model
 from multiphi_exudyn.time.core_levels import core_excitation, core_levels, level_data
 

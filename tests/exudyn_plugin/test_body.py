@@ -20,8 +20,8 @@ from scipy.integrate import solve_ivp
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
-from multiphi_exudyn.exudyn_plugin.body.stepping.own_loads import OwnLoads
-from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
+from multiphi_exudyn.exudyn_plugin.discretised_level import SteppedLevel
+from multiphi_exudyn.exudyn_plugin.step_test import OwnLoads
 from multiphi_exudyn.levels.model import level_store
 from reference_models.body_alone import solve_body_alone
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping

@@ -8,7 +8,7 @@ import pytest
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, Drawing, PositionInterface
-from multiphi_exudyn.exudyn_plugin.body.results.drawing import BLOCK, graphics_of
+from multiphi_exudyn.exudyn_plugin.drawing import BLOCK, graphics_of
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 from reference_models.solver_settings import fixed_steps
 

@@ -7,11 +7,10 @@ import pytest
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.exudyn_plugin.coupling import exact_motion
-from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedInertia, PointInertia
-from multiphi_exudyn.exudyn_plugin.coupling.exact_motion import ExactMotion
-from multiphi_exudyn.exudyn_plugin.coupling.interface import _direct_reactions
-from multiphi_exudyn.exudyn_plugin.coupling.modal_force import LevelForces
+from multiphi_exudyn.exudyn_plugin import coupled as exact_motion
+from multiphi_exudyn.exudyn_plugin.attached import AttachedInertia, PointInertia
+from multiphi_exudyn.exudyn_plugin.coupled import ExactMotion, LevelForces
+from multiphi_exudyn.exudyn_plugin.interface import _direct_reactions
 from multiphi_exudyn.time.run import chatter
 from multiphi_exudyn.time.simulate import Run
 

@@ -46,7 +46,7 @@ from test_interface import (
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody
-from multiphi_exudyn.exudyn_plugin.coupling.attached_inertia import AttachedInertia
+from multiphi_exudyn.exudyn_plugin.attached import AttachedInertia
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories, reduce
-from multiphi_exudyn.exudyn_plugin.convert.structure import linearize
+from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories, linearize, reduce
 from reference_models.published_systems import OwnRun, PublishedSystem
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")

@@ -14,8 +14,8 @@ import scipy.integrate
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
-from multiphi_exudyn.exudyn_plugin.convert.contacts.moved_directions import moved_directions
-from multiphi_exudyn.exudyn_plugin.convert.items.items import has_own_coordinates, is_constraint
+from multiphi_exudyn.exudyn_plugin.items import has_own_coordinates, is_constraint
+from multiphi_exudyn.exudyn_plugin.matrices import moved_directions
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")
 

@@ -11,7 +11,7 @@ from test_reduce import Mass
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
-from multiphi_exudyn.exudyn_plugin.convert.contacts.moved_directions import moved_directions
+from multiphi_exudyn.exudyn_plugin.matrices import moved_directions
 from reference_models.published_systems import OwnRun, PublishedSystem
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")

@@ -12,9 +12,8 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import Phase
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
-from multiphi_exudyn.exudyn_plugin.body.ahead.run_ahead import RunAhead
-from multiphi_exudyn.exudyn_plugin.body.ahead.undisturbed_steps import UndisturbedSteps
-from multiphi_exudyn.exudyn_plugin.coupling.stepped_level import SteppedLevel
+from multiphi_exudyn.exudyn_plugin.alone import RunAhead, UndisturbedSteps
+from multiphi_exudyn.exudyn_plugin.discretised_level import SteppedLevel
 from reference_models.solver_settings import fixed_steps
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")
@@ -276,7 +275,7 @@ def test_more_steps_than_are_planned_at_once_and_events_in_every_part(monkeypatc
     model = model_of(50.0)
     native = mp.simulate(model, T_END, velocity=VELOCITY)
     whole = System(model, matchedStepSize=STEP).solve()
-    monkeypatch.setattr("multiphi_exudyn.exudyn_plugin.body.ahead.run_ahead.STEPS_AHEAD", 16)
+    monkeypatch.setattr("multiphi_exudyn.exudyn_plugin.alone.STEPS_AHEAD", 16)
     system = System(model, matchedStepSize=STEP)
     found = system.solve()
     assert [event.contact for event in found.events] == [event.contact for event in native.events]

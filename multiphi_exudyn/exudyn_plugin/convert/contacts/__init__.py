@@ -1,4 +1,0 @@
-"""Contacts: contacts, stops and friction of an Exudyn system, and the rows of its points.
-
-Order: point_rows, moved_directions, frictions, contacts.
-"""

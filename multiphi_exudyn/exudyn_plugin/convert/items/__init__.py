@@ -1,4 +1,0 @@
-"""Items: what each item of an Exudyn system becomes in a reduced model.
-
-Order: directions, items, item_fates.
-"""
