@@ -15,8 +15,8 @@ from multiphi_exudyn.study.accuracy.study_report import render_study
 from multiphi_exudyn.study.accuracy.study_result import StudyResult, csv_text
 from multiphi_exudyn.study.comparison.wording import percent, seconds, share, times
 from multiphi_exudyn.study.results import TABLE
-from multiphi_exudyn.study.sweep.executors import open_executor
-from multiphi_exudyn.study.sweep.store import Store
+from multiphi_exudyn.study.store import Store
+from multiphi_exudyn.study.sweep import open_executor
 
 __all__ = ["run_study_file"]
 

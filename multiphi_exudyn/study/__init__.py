@@ -1,6 +1,6 @@
 """Scenes, runs of their models, and what comes out of comparing them; ``load`` gives a study's results as a table.
 
-Order: results, scene, running, measures, sweep, comparison, accuracy, stability.
+Order: results, scene, running, measures, store, sweep, comparison, accuracy, stability.
 """
 
 from multiphi_exudyn.study.results import load

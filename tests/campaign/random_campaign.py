@@ -43,7 +43,7 @@ from strategies import built, recipe_of
 from multiphi_exudyn import MultiPhiError, MultiPhiWarning, simulate
 from multiphi_exudyn.study.stability.law_check import broken_laws
 from multiphi_exudyn.study.stability.run_laws import complaints
-from multiphi_exudyn.study.sweep.time_limit import TimeLimitExceeded, call_within
+from multiphi_exudyn.study.sweep import TimeLimitExceeded, call_within
 from reference_models.exudyn_quiet import quiet
 
 CHUNK = 100  # cases written at a time

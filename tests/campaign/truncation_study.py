@@ -25,7 +25,7 @@ import numpy as np
 import scipy.linalg
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.study.sweep.time_limit import TimeLimitExceeded, call_within
+from multiphi_exudyn.study.sweep import TimeLimitExceeded, call_within
 from multiphi_exudyn.time.reliability.truncation import truncation_indicator
 
 WRONG, RIGHT = 0.05, 0.005

@@ -8,7 +8,7 @@ import numpy as np
 from multiphi_exudyn.study.accuracy.study_file import StudyFile
 from multiphi_exudyn.study.accuracy.study_result import MapPair, StudyResult
 from multiphi_exudyn.study.measures.spectra import wavelet_map
-from multiphi_exudyn.study.sweep.row import Row
+from multiphi_exudyn.study.store import Row
 
 ENVIRONMENT = {
     "date": "2026-01-02T03:04:05+00:00",

@@ -34,6 +34,11 @@ def busy(case):
     return {"seconds": case["seconds"]}
 
 
+def adds(case):
+    """In compiled code all the time, which no signal leaves."""
+    return {"sum": sum(range(case["numbers"]))}
+
+
 def converts(case):
     """An own error from whatever comes, as a solver of compiled code does with errors of its user functions."""
     try:

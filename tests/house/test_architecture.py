@@ -28,13 +28,12 @@ HEAVY = {
         "multiphi_exudyn/time/trajectory/histories.py",
     ),
     "pandas": ("multiphi_exudyn/study", "multiphi_exudyn/time/trajectory/histories.py"),
-    "distributed": ("multiphi_exudyn/study/sweep",),
+    "distributed": ("multiphi_exudyn/study/sweep.py",),
     "tqdm": (*(f"multiphi_exudyn/{room}" for room in ("mathematics", "time", "study", "cli")), "reference_models"),
     "h5py": ("multiphi_exudyn/mechanics/files/array_files.py",),
     "pyyeti": ("multiphi_exudyn/mechanics/files/array_files.py",),
 }
 CORE = "multiphi_exudyn._core"
-GUARDED = {"multiphi_exudyn/study/sweep/executors.py": {"fcntl"}}  # behind `if sys.platform == "linux"`
 LATE = (  # load what they name when it is asked for: a command's own module, the public names
     "multiphi_exudyn.cli.main",
     "multiphi_exudyn",
@@ -191,10 +190,9 @@ def test_a_heavy_package_is_imported_in_its_own_room_only(package):
         assert package not in names or inside, f"{path} imports {package}"
 
 
-def test_posix_modules_are_imported_where_they_are_guarded_only():
+def test_what_only_posix_has_is_imported_nowhere():
     for path in sources():
-        names = {name.split(".")[0] for name in imports_of(path)}
-        assert names & set(POSIX) == GUARDED.get(path.relative_to(ROOT).as_posix(), set()), path
+        assert not {name.split(".")[0] for name in imports_of(path)} & set(POSIX), path
 
 
 def test_nothing_light_is_imported_inside_a_function():

@@ -14,8 +14,8 @@ from multiphi_exudyn.study.running import runner, timing
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.workbench import prepare
-from multiphi_exudyn.study.sweep.executors import open_executor
-from multiphi_exudyn.study.sweep.store import Store
+from multiphi_exudyn.study.store import Store
+from multiphi_exudyn.study.sweep import open_executor
 
 SHIPPED = (
     "amplitude",

@@ -1,9 +1,11 @@
-"""Sweeps that lose nothing: killed, shared, interrupted, with cases that fail."""
+"""Sweeps that lose nothing: killed, shared, interrupted, with cases that fail; where they run, and for how long."""
 
+import contextlib
 import json
 import os
 import random
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -12,11 +14,28 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from sweep_functions import Unloadable, logged, many, odd_fails, square, sweep_logged, wave
+from sweep_functions import (
+    Unloadable,
+    adds,
+    busy,
+    converts,
+    dies,
+    exudyn_steps,
+    logged,
+    many,
+    odd_fails,
+    square,
+    swallows_once,
+    sweep_logged,
+    tells_no_raise,
+    wave,
+)
+from threadpoolctl import threadpool_info
 
-from multiphi_exudyn.study.sweep import Outcome, Row, Store, grid, open_executor, sweep
+from multiphi_exudyn.study.sweep import Outcome, Row, Store, TimeLimitExceeded, call_within, grid, open_executor, sweep
 
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+LONG = 60.0  # s, never waited for
 FEW, MANY = [0, 0, 1, 4, 6], [0] * 14 + [1, 1, 2, 2, 3, 3]  # after how many more cases; each costs the start of a pool
 
 
@@ -272,3 +291,221 @@ def test_two_processes_sweep_into_one_file(tmp_path):
     assert Counter(row.parameters["x"] for row in rows) == Counter(range(60))
     assert all(row.values == {"square": row.parameters["x"] ** 2} for row in rows)
     assert len(lines(log)) < 120
+
+
+@contextlib.contextmanager
+def sweeping(path, cases):
+    """A program that sweeps two held cases, with the processes it starts in a group of its own."""
+    program = (
+        "import sys, json, signal, sweep_functions\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell's background has it ignored
+        "sweep_functions.sweep_held(*json.loads(sys.argv[1]))"
+    )
+    command = [sys.executable, "-c", program, json.dumps([str(path), cases])]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, env=ENVIRONMENT, start_new_session=True, **pipes) as parent:
+        try:
+            assert [parent.stdout.readline() for _ in range(2)] == ["runs\n"] * 2
+            yield parent
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(parent.pid, signal.SIGKILL)
+
+
+def test_a_call_within_its_time_gives_what_it_gives():
+    assert call_within(None, lambda: 3) == 3
+    assert call_within(LONG, lambda: 3) == 3
+    with pytest.raises(ZeroDivisionError):
+        call_within(LONG, lambda: 1 / 0)
+
+
+@pytest.mark.parametrize("call", [time.sleep, lambda seconds: busy({"seconds": seconds})])
+def test_a_call_beyond_its_time_is_stopped(call):
+    begun = time.perf_counter()
+    with pytest.raises(TimeLimitExceeded):
+        call_within(0.05, lambda: call(LONG))
+    assert 0.05 <= time.perf_counter() - begun < LONG / 2
+
+
+def test_nothing_arrives_after_a_call_that_ends_when_its_time_does():
+    def stopped(limit):
+        try:
+            call_within(limit, lambda: busy({"seconds": 1e-3}))
+        except TimeLimitExceeded:
+            return True
+        finally:
+            busy({"seconds": 1e-4})  # what is left of the limit would be raised here
+        return False
+
+    assert {stopped(5e-4 + number * 4e-6) for number in range(250)} == {True, False}
+
+
+def limited_rows(store, executor):
+    cases = grid({"seconds": [0.0, LONG]})
+    return [sweep(run, cases, store, run.__name__, executor=executor, budget_s=0.1) for run in (busy, converts)]
+
+
+@pytest.mark.parametrize("where", ["here", "serial", "processes"])
+def test_the_budget_holds_in_this_process_and_in_others(store, pool, where):
+    with open_executor("serial") as serial:
+        executor = {"here": None, "serial": serial, "processes": pool}[where]
+        for short, long in limited_rows(store, executor):
+            assert (short.status, short.values) == ("ok", {"seconds": 0.0})
+            assert (long.status, long.values) == ("over budget", {})
+            assert long.message.endswith("s, the budget is 0.1 s")
+            assert 0.1 < long.elapsed_s < LONG / 2
+
+
+def test_a_solver_with_a_user_function_is_stopped(store):
+    (row,) = sweep(exudyn_steps, [{"steps": 10**9}], store, "exudyn", budget_s=0.2)
+    assert (row.status, row.values) == ("over budget", {})
+    (row,) = sweep(exudyn_steps, [{"steps": 10}], store, "exudyn", budget_s=LONG)
+    assert (row.status, row.values) == ("ok", {"position": pytest.approx(0.5)})
+
+
+def test_what_a_run_makes_of_the_exception_does_not_matter(store):
+    for run in (tells_no_raise, swallows_once):
+        (row,) = sweep(run, [{"seconds": LONG}], store, run.__name__, budget_s=0.05)
+        assert row.status == "over budget"
+
+
+def test_a_run_that_cannot_be_stopped_is_over_budget_when_it_ends(store):
+    with ThreadPoolExecutor(1) as threads:
+        (row,) = sweep(busy, [{"seconds": 0.1}], store, "busy", budget_s=0.05, executor=threads)
+    assert row.status == "over budget"
+    assert row.elapsed_s >= 0.1
+
+
+def test_a_process_that_stays_in_compiled_code_is_killed(store, monkeypatch):
+    monkeypatch.setattr("multiphi_exudyn.study.sweep.GRACE_S", 0.5)
+    with open_executor("processes", 1) as executor:
+        rows = sweep(adds, grid({"numbers": [10**11, 10]}), store, "adds", executor=executor, budget_s=0.5)
+    assert [row.status for row in rows] == ["over budget", "ok"]
+    assert 1.0 <= rows[0].elapsed_s < 30.0
+
+
+def test_a_budget_that_is_no_time_is_refused(store, refused):
+    for budget in (0, -1.0, float("nan"), float("inf")):
+        refused(ValueError, f"budget_s: {budget}", sweep, square, [], store, "pass", budget_s=budget)
+
+
+def test_a_worker_has_one_blas_thread_and_leaves_ctrl_c_to_its_parent(monkeypatch):
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        monkeypatch.setenv(name, "2")
+    with open_executor("processes", 1) as executor:
+        assert {found["num_threads"] for found in executor.submit(threadpool_info).result()} == {1}
+        assert executor.submit(os.getenv, "OPENBLAS_NUM_THREADS").result() == "1"
+        assert executor.submit(signal.getsignal, signal.SIGINT).result() == signal.SIG_IGN
+
+
+def test_only_the_case_that_kills_its_worker_fails(store):
+    cases = grid({"fatal": [[3, 4]], "x": range(8)})
+    with open_executor("processes", 2) as executor:
+        rows = sweep(dies, cases, store, "dies", executor=executor)
+        again = sweep(dies, cases, store, "dies", executor=executor)
+    assert [row.parameters["x"] for row in rows if row.status == "failed"] == [3, 4]
+    assert {row.message for row in rows if row.status == "failed"} == {"worker process died"}
+    assert [row.values["x"] for row in rows if row.status == "ok"] == [0, 1, 2, 5, 6, 7]
+    assert again == rows
+
+
+def test_workers_that_cannot_start_end_the_sweep_and_no_case_fails(tmp_path):
+    """A script that opens them without a guard starts itself again in each."""
+    script = tmp_path / "unguarded.py"
+    script.write_text(
+        "from multiphi_exudyn.study.sweep import Store, open_executor, sweep\n"
+        "def run(case): return {}\n"
+        "with Store('runs.db') as store, open_executor('processes', 1) as executor:\n"
+        "    sweep(run, [{'x': 1}], store, 'pass', executor=executor)\n"
+    )
+    command = [sys.executable, str(script)]
+    told = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, cwd=tmp_path, timeout=LONG)
+    assert "a script needs `if __name__ == '__main__':`" in told.stderr.splitlines()[-1]
+    with Store(tmp_path / "runs.db") as store:
+        assert store.rows("pass") == ()
+
+
+@pytest.mark.parametrize("locked", [False, True])
+def test_workers_end_with_a_parent_that_is_killed(tmp_path, locked):
+    if locked and sys.platform != "linux":
+        pytest.skip("a worker inside compiled code is told by a signal that Linux has")
+    with sweeping(tmp_path / "runs.db", grid({"locked": [locked], "x": range(4)})) as parent:
+        parent.kill()
+        output, _ = parent.communicate(timeout=LONG)  # to the end of the pipe: nobody holds it any more
+    assert output == ""
+
+
+def test_ctrl_c_keeps_what_has_finished_and_ends_the_workers(tmp_path):
+    with sweeping(tmp_path / "runs.db", grid({"locked": [True], "short": [10], "x": range(14)})) as parent:
+        time.sleep(0.5)  # the last of the short ones may still be on its way to the parent
+        os.killpg(parent.pid, signal.SIGINT)
+        _, errors = parent.communicate(timeout=LONG)
+    assert parent.returncode != 0
+    assert errors.count("KeyboardInterrupt") == 1
+    with Store(tmp_path / "runs.db") as store:
+        assert sorted(row.parameters["x"] for row in store.rows("held")) == list(range(10))
+
+
+@pytest.mark.parametrize(("where", "workers"), [("dask", None), ("tcp://host", None), ("", None), ("processes", 0)])
+def test_a_place_that_is_none_is_refused(refused, where, workers):
+    refused(ValueError, "workers: 0" if workers == 0 else f"where: {where!r}", open_executor, where, workers)
+
+
+def test_a_missing_cluster_package_is_named(refused, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    refused(
+        ValueError, "where: tcp://127.0.0.1:8786; need the package", open_executor("tcp://127.0.0.1:8786").__enter__
+    )
+
+
+def test_an_address_without_an_answer_is_named(refused, monkeypatch):
+    monkeypatch.setattr("multiphi_exudyn.study.sweep.ANSWER_S", 0.5)
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
+        refused(ValueError, f"where: no answer at {address}", open_executor(address).__enter__)
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """Address of a Dask scheduler with two workers, in processes of their own."""
+    file = tmp_path / "scheduler.json"
+    environment = ENVIRONMENT | {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
+
+    with contextlib.ExitStack() as programs:
+
+        def start(program, *options):
+            command = [sys.executable, "-m", f"distributed.cli.{program}", "--no-dashboard", "--host", "127.0.0.1"]
+            opened = subprocess.Popen([*command, *options], stderr=subprocess.DEVNULL, env=environment, cwd=tmp_path)
+            programs.enter_context(opened)
+            programs.callback(opened.kill)
+
+        start("dask_scheduler", "--port", "0", "--scheduler-file", str(file))
+        for _ in range(2):
+            start("dask_worker", "--scheduler-file", str(file), "--nthreads", "1", "--no-nanny")
+        yield address_in(file)
+
+
+def address_in(file):
+    """The address that a scheduler writes; its file is there before its text is."""
+    until = time.perf_counter() + LONG
+    while time.perf_counter() < until:
+        with contextlib.suppress(FileNotFoundError, json.JSONDecodeError):
+            return json.loads(file.read_text())["address"]
+        time.sleep(0.01)
+    raise TimeoutError(f"no scheduler within {LONG} s")
+
+
+def told(rows):
+    return [(row.parameters, row.status, row.values) for row in rows]
+
+
+def test_a_cluster_gives_the_rows_of_this_process(store, cluster):
+    cases = grid({"x": range(40)})
+    with open_executor(cluster) as executor:
+        rows = sweep(square, cases, store, "cluster", executor=executor)
+        (late,) = sweep(busy, [{"seconds": 0.1}], store, "late", executor=executor, budget_s=0.05)
+        (died,) = sweep(dies, [{"x": 1, "fatal": [1]}], store, "dies", executor=executor)
+    assert told(rows) == told(sweep(square, cases, store, "here"))
+    assert late.status == "over budget"
+    assert (died.status, died.message) == ("failed", "worker process died")

@@ -18,7 +18,7 @@ import pandas as pd
 
 from multiphi_exudyn.study.accuracy.study_file import REFERENCE, is_number
 from multiphi_exudyn.study.accuracy.study_result import StudyResult
-from multiphi_exudyn.study.sweep.row import key_of
+from multiphi_exudyn.study.store import key_of
 
 __all__ = ["FINER", "Series", "numeric_axes", "series", "tables_along"]
 

@@ -16,7 +16,7 @@ from multiphi_exudyn.study.accuracy.study_result import StudyResult, worst_judge
 from multiphi_exudyn.study.comparison.wording import seconds
 from multiphi_exudyn.study.running.runner import modes_text
 from multiphi_exudyn.study.running.timing import REPEAT_BUDGET_S
-from multiphi_exudyn.study.sweep.row import key_of
+from multiphi_exudyn.study.store import key_of
 
 __all__ = [
     "cheapest",

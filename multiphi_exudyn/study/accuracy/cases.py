@@ -32,7 +32,7 @@ from multiphi_exudyn.study.scene.places import with_value
 from multiphi_exudyn.study.scene.scene_file import SceneFile
 from multiphi_exudyn.study.scene.scenes import Scene, scene_data, scene_of
 from multiphi_exudyn.study.scene.toml_file import read_toml, validated
-from multiphi_exudyn.study.sweep.sweep import grid
+from multiphi_exudyn.study.sweep import grid
 
 __all__ = ["BUDGET", "CASE", "TURNS", "Parameters", "Study", "load_study", "shipped_studies"]
 

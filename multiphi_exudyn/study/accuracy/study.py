@@ -32,10 +32,8 @@ from multiphi_exudyn.study.running.runs import ModelRun, from_arrays, to_arrays
 from multiphi_exudyn.study.running.timing import TURNS_BUDGET_S, in_turns
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.workbench import Setup, prepare
-from multiphi_exudyn.study.sweep.row import Row
-from multiphi_exudyn.study.sweep.run import Function, Outcome
-from multiphi_exudyn.study.sweep.store import Store
-from multiphi_exudyn.study.sweep.sweep import sweep
+from multiphi_exudyn.study.store import Row, Store
+from multiphi_exudyn.study.sweep import Function, Outcome, sweep
 from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
 __all__ = ["BudgetRun", "MeasuredRun", "TimedRun", "TimedTurns", "run_study"]

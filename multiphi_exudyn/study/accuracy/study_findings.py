@@ -28,7 +28,7 @@ from multiphi_exudyn.study.accuracy.study_result import StudyResult
 from multiphi_exudyn.study.comparison.pages import sentences
 from multiphi_exudyn.study.comparison.run_warnings import run_warnings
 from multiphi_exudyn.study.comparison.wording import percent
-from multiphi_exudyn.study.sweep.row import Row
+from multiphi_exudyn.study.store import Row
 
 __all__ = ["error_text", "findings", "records", "shown_points", "study_warnings"]
 

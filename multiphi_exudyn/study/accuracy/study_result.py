@@ -20,7 +20,7 @@ import pandas as pd
 from multiphi_exudyn.study.accuracy.study_file import REFERENCE, StudyFile
 from multiphi_exudyn.study.measures.spectra import Map
 from multiphi_exudyn.study.running.timing import FEWEST_ROUNDS, undisturbed
-from multiphi_exudyn.study.sweep.row import Row, key_of
+from multiphi_exudyn.study.store import Row, key_of
 
 __all__ = ["MapPair", "StudyResult", "all_numbers", "csv_text", "error_of", "setting_key", "worst_judged"]
 

@@ -21,7 +21,7 @@ from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.scene.model_kinds import ReducedModel, UserObjectModel
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF, Setup
-from multiphi_exudyn.study.sweep.row import plain
+from multiphi_exudyn.study.store import plain
 
 __all__ = ["MOST_LISTED", "Comparison", "compare", "histories", "summary"]
 

@@ -9,7 +9,7 @@ from multiphi_exudyn.study.running.timing import timed
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.judgement import judge
 from multiphi_exudyn.study.stability.outcome import FAILED, OK, Outcome
-from multiphi_exudyn.study.sweep.time_limit import TimeLimitExceeded, call_within
+from multiphi_exudyn.study.sweep import TimeLimitExceeded, call_within
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.trajectory.trajectory import Trajectory
 
