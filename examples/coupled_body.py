@@ -29,7 +29,7 @@ import numpy as np
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, LinearizedStructure, body_histories, linear_structure_from
-from multiphi_exudyn.mechanics.beams.beam import Beam, Clamp
+from multiphi_exudyn.mechanics.beam import Beam, Clamp
 from reference_models.beam_system import BeamSystem, build_beam_system
 from reference_models.beams import as_beams
 from reference_models.exudyn_quiet import quiet

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mechanics.loads.loads import Load
+from multiphi_exudyn.mechanics.loads import Load
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 
 ROUNDS, STIFFNESS = 9, 1e6  # times that every case is timed, N/m

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
-from multiphi_exudyn.mechanics.elements.force_law import Function
+from multiphi_exudyn.mechanics.force_law import Function
 from reference_models.rig import rig_beam
 from reference_models.solver_settings import fixed_steps
 

@@ -16,7 +16,7 @@ import matplotlib.figure
 import numpy as np
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mechanics.structures.structure import damping_matrix
+from multiphi_exudyn.mechanics.structure import damping_matrix
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import rig_beam, rig_contact, rig_damping
 

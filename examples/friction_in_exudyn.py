@@ -14,7 +14,7 @@ import numpy as np
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import reduce
-from multiphi_exudyn.mechanics.structures.structure import damping_matrix
+from multiphi_exudyn.mechanics.structure import damping_matrix
 from reference_models.beam_system import build_beam_system
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.full_run import FullRun

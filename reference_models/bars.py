@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from reference_models.exact import BouncingBar
 
 __all__ = ["clamped_bar", "elastic_bar", "free_bar", "nodes"]

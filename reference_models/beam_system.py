@@ -17,7 +17,7 @@ import exudyn as exu
 import exudyn.itemInterface as eii
 import numpy as np
 
-from multiphi_exudyn.mechanics.structures.assembly import Tie
+from multiphi_exudyn.mechanics.assembly import Tie
 from reference_models.beams import Beams
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.laid_beam import AXIAL, DEFLECTION, Place, coordinate_marker, lay_beam

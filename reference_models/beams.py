@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.beams.beam import Beam
-from multiphi_exudyn.mechanics.structures.assembly import Tie
+from multiphi_exudyn.mechanics.assembly import Tie
+from multiphi_exudyn.mechanics.beam import Beam
 
 __all__ = ["NAMELESS", "Beams", "as_beams"]
 

@@ -13,7 +13,7 @@ from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin import BodyHistories, CreateMultiPhiBody, body_histories
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.loads.loads import Load
+from multiphi_exudyn.mechanics.loads import Load
 from reference_models.exudyn_quiet import cpu_limit, quiet
 from reference_models.solver_settings import fixed_steps
 

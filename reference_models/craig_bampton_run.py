@@ -20,7 +20,7 @@ import exudyn.itemInterface as eii
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
+from multiphi_exudyn.mechanics.contact import UnilateralContact
 from reference_models.craig_bampton import CraigBampton
 from reference_models.exudyn_quiet import quiet
 from reference_models.point_contact import PointContact

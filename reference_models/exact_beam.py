@@ -24,8 +24,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.beams.beam import Beam
-from multiphi_exudyn.mechanics.beams.section import Section
+from multiphi_exudyn.mechanics.beam import Beam, Section
 
 __all__ = ["exact_frequencies"]
 

@@ -23,10 +23,10 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.exudyn_plugin import LinearizedStructure, linear_structure_from
-from multiphi_exudyn.mechanics.beams.beam import Beam
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.elements.friction import Friction
-from multiphi_exudyn.mechanics.loads.loads import Load
+from multiphi_exudyn.mechanics.beam import Beam
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.mechanics.loads import Load
 from reference_models.actions import Actions, actions_of
 from reference_models.beam_system import BeamSystem, build_beam_system
 from reference_models.beams import Beams, as_beams

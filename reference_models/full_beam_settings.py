@@ -19,7 +19,7 @@ class FullBeamSettings:
 
     kind: "ancf" (ANCFCable2D: no shear, no rotary inertia of the section) or "geometrically-exact"
         (ObjectBeamGeometricallyExact2D: shear stiffness k G A, rotary inertia).
-    elements: aimed at; nodes stand at every point, mass and section end (mechanics.beams.beam.beam_nodes).
+    elements: aimed at; nodes stand at every point, mass and section end (mechanics.beam.beam_nodes).
     step: time step [s]; halved by the solver, down to step / 256, where its iteration does not converge.
     contact: "coordinate" (ObjectContactCoordinate on the node's deflection) or "circle"
         (ObjectContactCircleCable2D, a round support of ``circle_radius`` [m]; ancf only).

@@ -22,10 +22,10 @@ import scipy.sparse
 from scipy.integrate import cumulative_trapezoid
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.elements.element import AnyLink
-from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.element import AnyLink
+from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from reference_models.exudyn_quiet import cpu_limit, quiet
 from reference_models.full_beam_settings import FullBeamSettings
 from reference_models.solver_settings import simulation_settings

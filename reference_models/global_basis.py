@@ -14,8 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from reference_models.projection import projected
 
 __all__ = ["global_basis"]

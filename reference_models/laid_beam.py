@@ -16,9 +16,7 @@ from typing import Any
 import exudyn.itemInterface as eii
 import numpy as np
 
-from multiphi_exudyn.mechanics.beams.beam import Beam
-from multiphi_exudyn.mechanics.beams.planar_beam import beam_nodes
-from multiphi_exudyn.mechanics.beams.section import Section
+from multiphi_exudyn.mechanics.beam import Beam, Section, beam_nodes
 from reference_models.full_beam_settings import FullBeamSettings
 
 __all__ = ["AXIAL", "DEFLECTION", "LaidBeam", "Place", "bending_coordinates", "coordinate_marker", "lay_beam"]

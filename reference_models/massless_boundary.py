@@ -18,13 +18,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.elements.friction import Friction
-from multiphi_exudyn.mechanics.loads.loads import HarmonicLoad
-from multiphi_exudyn.mechanics.loads.moving_supports import StopMotion
-from multiphi_exudyn.mechanics.loads.time_functions import Harmonic
-from multiphi_exudyn.mechanics.structures.structure import At, LinearStructure
+from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.mechanics.loads import HarmonicLoad, StopMotion
+from multiphi_exudyn.mechanics.structure import At, LinearStructure
+from multiphi_exudyn.mechanics.time_functions import Harmonic
 from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["MasslessBoundary", "massless_boundary"]
 

@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.projection import projected
 
 __all__ = ["pod_basis"]

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.structures.structure import At
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.structure import At
 from reference_models.beams import Beams
 
 __all__ = ["PointContact", "Tangent", "point_and_coefficient", "point_and_other", "point_contacts"]

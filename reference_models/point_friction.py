@@ -24,7 +24,7 @@ import exudyn.itemInterface as eii
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.elements.friction import Friction
+from multiphi_exudyn.mechanics.friction import Friction
 from reference_models.beams import Beams
 from reference_models.point_contact import point_and_other
 

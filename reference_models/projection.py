@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from multiphi_exudyn.levels.base.modal_base import ModalBase
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["projected"]
 

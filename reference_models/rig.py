@@ -19,10 +19,9 @@ from types import MappingProxyType
 from typing import Any
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.beams.beam import Beam, Clamp, PointMass
-from multiphi_exudyn.mechanics.beams.section import Section
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.structures.damping import ModalDamping
+from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass, Section
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.damping import ModalDamping
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -20,8 +20,8 @@ import scipy.linalg
 
 from multiphi_exudyn._core import split_steps
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from reference_models.craig_bampton import craig_bampton
 from reference_models.stepwise import StepwiseHistories
 

@@ -16,7 +16,7 @@ from multiphi_exudyn.study.comparison.wording import percent
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
-from multiphi_exudyn.time.warnings.warning_groups import grouped
+from multiphi_exudyn.time.model_warnings import grouped
 
 __all__ = ["run_budget"]
 

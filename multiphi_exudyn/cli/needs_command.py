@@ -8,7 +8,7 @@ from tqdm import tqdm
 
 from multiphi_exudyn.study.running.needs import needs_of, needs_table
 from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
-from multiphi_exudyn.time.warnings.warning_groups import grouped
+from multiphi_exudyn.time.model_warnings import grouped
 
 __all__ = ["run_needs"]
 

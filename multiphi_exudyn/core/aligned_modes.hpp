@@ -1,7 +1,7 @@
 // Aligned modes: their signs, and which of them have one frequency, the same on every processor.
 //
 // The sign of a mode, and the basis of a space of modes of one frequency, are arbitrary: an eigensolver chooses them by
-// round-off. The first of some rows that has a value in a mode has a positive one; mathematics/eigenproblems/modes.py
+// round-off. The first of some rows that has a value in a mode has a positive one; mathematics/modes.py
 // chooses the bases.
 #pragma once
 

@@ -51,11 +51,11 @@ from multiphi_exudyn.exudyn_plugin.state import SAME_STEP, Coordinates, RunRecor
 from multiphi_exudyn.exudyn_plugin.step_test import OwnLoads
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
-from multiphi_exudyn.time.record.recorded_segments import Recorded
-from multiphi_exudyn.time.reliability.law_span import law_times
-from multiphi_exudyn.time.run.motion import Motion
-from multiphi_exudyn.time.segments.segment import Segments
+from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.time.law_warnings import law_times
+from multiphi_exudyn.time.motion import Motion
+from multiphi_exudyn.time.record import Recorded
+from multiphi_exudyn.time.segments import Segments
 
 PHASES = tuple(Phase)
 TIME_ROUNDING = 1e-9  # of a step: a change this little after the end of a step is counted in it

@@ -45,9 +45,9 @@ from multiphi_exudyn.exudyn_plugin.solver import (
 from multiphi_exudyn.exudyn_plugin.state import SAME_STEP, Coordinates, LevelData, RunRecord, StepErrors
 from multiphi_exudyn.exudyn_plugin.step_test import OwnLoads
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mechanics.loads.loads import Load
-from multiphi_exudyn.time.reliability.run_warnings import warnings_of_body
-from multiphi_exudyn.time.run.motion import Motion
+from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.time.motion import Motion
+from multiphi_exudyn.time.run_warnings import warnings_of_body
 
 
 class StartedBody(Protocol):

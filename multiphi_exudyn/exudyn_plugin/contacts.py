@@ -31,8 +31,8 @@ from exudyn.advancedUtilities import NumericalJacobian
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.items import has_friction, has_limit_stops, is_sphere_contact
 from multiphi_exudyn.exudyn_plugin.system import sphere_gap
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.elements.friction import Friction
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.friction import Friction
 
 HELD = 1e-9  # of a row's largest entry before projection: a smaller row is a point that constraints fix
 _AXES = ("x", "y", "z")

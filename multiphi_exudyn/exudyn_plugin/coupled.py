@@ -65,11 +65,10 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.blas_threads import one_blas_thread
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT
-from multiphi_exudyn.mechanics.elements.element import Element, event_kind
+from multiphi_exudyn.mechanics.element import Element, event_kind
 from multiphi_exudyn.time.core_levels import core_excitation, level_data
-from multiphi_exudyn.time.reliability.law_span import laws_at_an_end
-from multiphi_exudyn.time.run.chatter import limits
-from multiphi_exudyn.time.run.failures import failure
+from multiphi_exudyn.time.law_warnings import laws_at_an_end
+from multiphi_exudyn.time.motion import failure, limits
 
 LEVEL_BYTES = 2**29  # of all levels under held forces: with more they are made anew
 CORE_PHASES = {phase: getattr(core.Phase, phase.name.lower()) for phase in Phase}

@@ -21,13 +21,12 @@ from multiphi_exudyn.exudyn_plugin.state import matrices
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.model.mode_choice import Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.loads.loads import Load
-from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
-from multiphi_exudyn.mechanics.structures.arguments import is_real
-from multiphi_exudyn.time.run.motion import Motion
+from multiphi_exudyn.mechanics.arguments import is_real
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
+from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.simulate import Run, base_warnings_of, check_start, holding
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory import Trajectory
 
 PROVISIONAL = 1.0  # s: end of the run for which the loads are prepared, until the solver gives the real one
 

@@ -25,9 +25,8 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.sensors import reconstruct
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.beams.beam import Beam
-from multiphi_exudyn.mechanics.beams.planar_beam import beam_deflections
-from multiphi_exudyn.mechanics.structures.arguments import is_real, real_array
+from multiphi_exudyn.mechanics.arguments import is_real, real_array
+from multiphi_exudyn.mechanics.beam import Beam, beam_deflections
 
 PARALLEL = 1e-9  # relative: rounding of the coefficients of a contact's direction
 SIDES = 12  # of a bar: looks round, costs little

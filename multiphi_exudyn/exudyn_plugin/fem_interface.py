@@ -16,11 +16,11 @@ import numpy as np
 import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.mechanics.structures.arguments import Matrix, one_of
-from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.structures.dofs import COMPONENTS as NAMES
-from multiphi_exudyn.mechanics.structures.dofs import DofTable
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.arguments import Matrix, one_of
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.dofs import COMPONENTS as NAMES
+from multiphi_exudyn.mechanics.dofs import DofTable
+from multiphi_exudyn.mechanics.structure import LinearStructure
 
 COMPONENTS = 3  # of the displacement of a node
 IN_LINE = 1e-9  # of the largest moment of inertia: with a smaller one about an axis, all nodes lie on it

@@ -72,8 +72,8 @@ from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.round_off import drop_round_off
-from multiphi_exudyn.mechanics.structures.arguments import real_array
-from multiphi_exudyn.mechanics.structures.structure import At, LinearStructure
+from multiphi_exudyn.mechanics.arguments import real_array
+from multiphi_exudyn.mechanics.structure import At, LinearStructure
 
 TURN = math.radians(5.0)  # rad: limit of the rotation of an interface, as the body is linear
 ROTATIONS = {2: 1, 3: 3}  # by the number of directions: about z in a plane, about x, y and z in space

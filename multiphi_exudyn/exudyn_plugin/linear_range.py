@@ -62,9 +62,9 @@ from multiphi_exudyn.exudyn_plugin.system import (
     without_contacts,
 )
 from multiphi_exudyn.exudyn_plugin.timed import PrescribedMotion, TimedLoad
-from multiphi_exudyn.mechanics.elements.element import Element
-from multiphi_exudyn.mechanics.elements.friction import Friction
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.mechanics.element import Element
+from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.time.trajectory import Trajectory
 
 FAST = 10.0  # times the rate of the motion: a faster mode follows it in equilibrium, with an error of 1 %
 TOUCHING = 1e-9  # of the largest displacement: a smaller gap counts as closed

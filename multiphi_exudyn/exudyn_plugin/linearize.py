@@ -25,11 +25,11 @@ from multiphi_exudyn.exudyn_plugin.items import has_own_coordinates
 from multiphi_exudyn.exudyn_plugin.matrices import forces, projected_matrices
 from multiphi_exudyn.exudyn_plugin.start_state import violated_constraints
 from multiphi_exudyn.exudyn_plugin.system import initial_is_current
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.structures.arguments import Matrix
-from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.structures.dofs import Place
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.dofs import Place
+from multiphi_exudyn.mechanics.structure import LinearStructure
 
 EQUILIBRIUM = 1e-6  # of the largest elastic force: residual of a static solution
 LARGEST = 10_000  # ODE2 coordinates: a dense matrix of them has 0.8 GB

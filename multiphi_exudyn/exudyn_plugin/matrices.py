@@ -46,7 +46,7 @@ from multiphi_exudyn.exudyn_plugin.system import (
     mass_matrix,
     static_solver,
 )
-from multiphi_exudyn.mathematics.eigenproblems.modes import Modes, complete_modes
+from multiphi_exudyn.mathematics.modes import Modes, complete_modes
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 
 FORCE_ROUND_OFF = 1e-12  # of the largest force: a smaller constraint force is round-off

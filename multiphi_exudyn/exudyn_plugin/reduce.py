@@ -60,15 +60,13 @@ from multiphi_exudyn.exudyn_plugin.timed import (
 )
 from multiphi_exudyn.levels.model.mode_choice import Tolerance, UpTo
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.elements.friction import Friction
-from multiphi_exudyn.mechanics.loads.loads import FunctionLoad, Load, VaryingLoad
-from multiphi_exudyn.mechanics.loads.moving_supports import StopMotion
-from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad
-from multiphi_exudyn.mechanics.loads.time_functions import Smooth
-from multiphi_exudyn.mechanics.structures.arguments import Matrix
-from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.mechanics.loads import ConstantLoad, FunctionLoad, Load, StopMotion, VaryingLoad
+from multiphi_exudyn.mechanics.time_functions import Smooth
+from multiphi_exudyn.time.trajectory import Trajectory
 
 SMALL = 100  # coordinates up to which all modes are kept by default: a run then has the accuracy of the system's own
 HELD = 1e-9  # of a row's largest entry before projection: a smaller row is a contact whose gap constraints fix

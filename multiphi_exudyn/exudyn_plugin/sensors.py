@@ -28,9 +28,9 @@ from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import Event
 from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.solver import bodies_of
-from multiphi_exudyn.mechanics.elements.element import links_of
-from multiphi_exudyn.mechanics.structures.arguments import no_text
-from multiphi_exudyn.time.segments.level_rows import force_row, patch_row, pressing_row
+from multiphi_exudyn.mechanics.arguments import no_text
+from multiphi_exudyn.mechanics.element import links_of
+from multiphi_exudyn.time.segments import force_row, patch_row, pressing_row
 
 RECORDED = {
     "sCoordinates": exu.OutputVariableType.Coordinates,

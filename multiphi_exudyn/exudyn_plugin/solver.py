@@ -49,7 +49,7 @@ from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiVal
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.exits import asked_state, exits_of, force_shares, signal_rows, state_of
 from multiphi_exudyn.exudyn_plugin.state import SAME_STEP, Coordinates
-from multiphi_exudyn.time.warnings.warning_groups import CALLER, issue
+from multiphi_exudyn.time.model_warnings import CALLER, issue
 
 RESIDUAL = 1e-7  # of its terms: a signal that is less negative is the residual of the solver's iterations
 GREEDY = 5  # solutions for every element after which the element of the most negative signal takes its exit

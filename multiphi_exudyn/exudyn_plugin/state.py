@@ -48,9 +48,9 @@ from multiphi_exudyn.exudyn_plugin.interface import Interface
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
-from multiphi_exudyn.time.reliability.law_span import LawPlaces
-from multiphi_exudyn.time.reliability.run_warnings import RunSummary
+from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.time.law_warnings import LawPlaces
+from multiphi_exudyn.time.run_warnings import RunSummary
 
 PHASES = tuple(Phase)
 ONE = np.ones(1)  # the entry 1 of x = (q, q', q'', 1, f)

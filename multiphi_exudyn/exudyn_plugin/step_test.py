@@ -46,8 +46,8 @@ from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.events.transitions.state import Phase, Row, State
 from multiphi_exudyn.exudyn_plugin.discretised_level import SteppedLevel
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
-from multiphi_exudyn.mechanics.loads.loads import Load
+from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
+from multiphi_exudyn.mechanics.loads import Load
 
 NEGLIGIBLE = float(np.finfo(float).eps)  # of a signal: smaller values count as zero
 FINER = 10.0  # smooth time functions of loads are approximated to a tenth of their tolerance

@@ -27,10 +27,10 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.items import is_active, user_function, value_key
 from multiphi_exudyn.exudyn_plugin.system import Directions, generalised_forces, residuals, static_solver
-from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
-from multiphi_exudyn.mechanics.loads.loads import FunctionLoad, VaryingLoad
-from multiphi_exudyn.mechanics.loads.time_functions import Smooth
-from multiphi_exudyn.mechanics.structures.arguments import is_real
+from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
+from multiphi_exudyn.mechanics.arguments import is_real
+from multiphi_exudyn.mechanics.loads import FunctionLoad, VaryingLoad
+from multiphi_exudyn.mechanics.time_functions import Smooth
 
 SAMPLE_TIMES = np.concatenate(
     [[0.0], np.geomspace(1e-6, 1e3, 64)]

@@ -10,9 +10,9 @@ import numpy as np
 
 import multiphi_exudyn._core as core
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.elements.element import Element, ElementState, Exit, friction_spring
-from multiphi_exudyn.mechanics.elements.friction import Friction
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.element import Element, ElementState, Exit, friction_spring
+from multiphi_exudyn.mechanics.friction import Friction
 
 __all__ = ["core_model"]
 

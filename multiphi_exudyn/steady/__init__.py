@@ -2,5 +2,5 @@
 
 A frequency response is a sequence of steady states.
 
-Order: settled_state, shooting, settling, steady_state, frequency_response.
+Order: shooting, steady_state, frequency_response.
 """

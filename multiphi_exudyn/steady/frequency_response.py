@@ -16,12 +16,11 @@ from multiphi_exudyn.display import Shown
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.loads.static_loads import StaticLoad
-from multiphi_exudyn.mechanics.structures.structure import At
-from multiphi_exudyn.steady.settled_state import PeriodicLoad, SteadyState
-from multiphi_exudyn.steady.steady_state import at_frequency, settle_run
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
-from multiphi_exudyn.time.warnings.warning_groups import grouped, issue, kept_back
+from multiphi_exudyn.mechanics.loads import StaticLoad
+from multiphi_exudyn.mechanics.structure import At
+from multiphi_exudyn.steady.steady_state import PeriodicLoad, SteadyState, at_frequency, settle_run
+from multiphi_exudyn.time.model_warnings import grouped, issue, kept_back
+from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["FrequencyResponse", "frequency_response"]
 

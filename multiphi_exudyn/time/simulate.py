@@ -1,7 +1,13 @@
 """Simulation: exact modal motion from event to event (eqs. 38.3, 38.6). There is no time step.
 
-The loop (loop.py) advances the start from event to event. The result is a Trajectory of analytic segments. A failure
+The core advances the start from event to event. The result is a Trajectory of analytic segments. A failure
 ends the trajectory early, with a status and its cause.
+
+Refinement: interpolation of smooth load courses that is fine enough for their tolerance of the response.
+
+An error dp of a modal force changes z = (omega eta, eta') by no more than the integral of |dp|, in every level. The
+error of the interpolated courses, times |P| and the length of the run, is compared with the largest |z|. The bound does
+not include the sensitivity to events, which separates any two motions that differ.
 """
 
 from __future__ import annotations
@@ -19,19 +25,17 @@ from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.model.mode_choice import Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.loads.loads import Load, patterns, unchanging
-from multiphi_exudyn.mechanics.loads.moving_supports import StopsMotion
-from multiphi_exudyn.mechanics.loads.time_functions import Harmonic
-from multiphi_exudyn.mechanics.structures.arguments import is_real
-from multiphi_exudyn.time.reliability.run_warnings import warnings_of
-from multiphi_exudyn.time.reliability.truncation import run_with_enough_modes
-from multiphi_exudyn.time.run.continuation import continued_start, with_final_velocity
-from multiphi_exudyn.time.run.motion import Motion
-from multiphi_exudyn.time.run.refinement import to_tolerance
-from multiphi_exudyn.time.run.start import first_start
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
-from multiphi_exudyn.time.warnings.base_warnings import base_warnings
-from multiphi_exudyn.time.warnings.warning_groups import issue
+from multiphi_exudyn.mechanics.arguments import is_real
+from multiphi_exudyn.mechanics.loads import Load, StopsMotion, patterns, unchanging
+from multiphi_exudyn.mechanics.time_functions import Harmonic, Smooth, Sweep
+from multiphi_exudyn.time.continuation import continued_start, with_final_velocity
+from multiphi_exudyn.time.model_warnings import base_warnings, issue
+from multiphi_exudyn.time.motion import Motion
+from multiphi_exudyn.time.run_warnings import warnings_of
+from multiphi_exudyn.time.segments import Segment, as_segments
+from multiphi_exudyn.time.start import first_start
+from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.truncation import run_with_enough_modes
 
 __all__ = [
     "Run",
@@ -40,9 +44,16 @@ __all__ = [
     "check_start",
     "checked_end",
     "holding",
+    "refined",
     "run_with_warnings",
     "simulate",
+    "to_tolerance",
 ]
+
+
+REFINEMENTS = 2  # of smooth courses; the second corrects for the changes by the first
+SAFETY = 1.5  # on the factor by which they are refined
+SAMPLES = 257  # of the energy, for its largest value
 
 
 def simulate(
@@ -299,3 +310,44 @@ def _time(name: str, value: float) -> float:
     if not (math.isfinite(value) and value > 0):
         raise MultiPhiValueError(f"{name}: got {value!r}, need a finite time > 0 s")
     return float(value)
+
+
+def to_tolerance(run: Callable[[float], Trajectory], loads: Sequence[Load]) -> Trajectory:
+    """Run with smooth courses that are fine enough; ``run`` takes the factor by which they are refined."""
+    trajectory, finer = run(1.0), 1.0
+    if not loads:
+        return trajectory
+    tolerances = [course.tolerance for course in refined(loads)]
+    for _ in range(REFINEMENTS if tolerances else 0):
+        if trajectory.status != "ok" or (error := _interpolation_error(trajectory)) <= min(tolerances):
+            return trajectory
+        finer *= SAFETY * error / min(tolerances)
+        trajectory = run(finer)
+    if tolerances and trajectory.status == "ok" and (error := _interpolation_error(trajectory)) > min(tolerances):
+        reached = f"smooth loads: the response is accurate to {error:.2g} of its largest value"
+        return replace(trajectory, message=f"{reached}, not to {min(tolerances):g}")
+    return trajectory
+
+
+def refined(loads: Sequence[Load]) -> list[Smooth | Sweep]:
+    """The smooth courses of loads."""
+    courses = [getattr(load, "course", None) for load in loads]
+    return [course for course in courses if isinstance(course, (Smooth, Sweep))]
+
+
+def _interpolation_error(trajectory: Trajectory) -> float:
+    """Bound of the error of z due to interpolated courses, relative to the largest |z|."""
+    level = trajectory.segments[0].level
+    errors = np.array([history.error for history in level.excitation.histories])
+    error_bound = trajectory.t_end * float(np.linalg.norm(np.abs(level.channels.force[:, : len(errors)]) @ errors))
+    if error_bound == 0:
+        return 0.0
+    times = np.linspace(trajectory.start.time, trajectory.t_end, SAMPLES)
+    energies = as_segments(trajectory.segments).evaluated(times, "right", _size_of_energy)
+    return error_bound / max(math.sqrt(2 * float(np.max(energies))), np.finfo(float).tiny)
+
+
+def _size_of_energy(segment: Segment, times: np.ndarray) -> np.ndarray:
+    """Kinetic energy and the size of strain energy (k,) [J], which force laws may make negative."""
+    level = segment.level
+    return np.asarray(level.kinetic(segment.modal(times, 1)) + np.abs(level.strain(segment.modal(times))))

@@ -17,7 +17,7 @@ from strategies import CHOICES, Recipe, built, cases
 from multiphi_exudyn import ConstantLoad, LinearStructure, MultiPhiModel, UnilateralContact, simulate
 from multiphi_exudyn.study.stability.run_laws import complaints, missed
 from multiphi_exudyn.study.stability.run_signals import Signal
-from multiphi_exudyn.time.segments.segment import SegmentList
+from multiphi_exudyn.time.segments import SegmentList
 
 DISTINCT = ("chain", "free chain", "dense", "wide")  # frequencies: of repeated ones a truncated basis may keep any
 DENSE = 1e4  # samples of the shortest period

@@ -26,7 +26,7 @@ import scipy.linalg
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.study.sweep import TimeLimitExceeded, call_within
-from multiphi_exudyn.time.reliability.truncation import truncation_indicator
+from multiphi_exudyn.time.truncation import truncation_indicator
 
 WRONG, RIGHT = 0.05, 0.005
 INSTANTS = 601  # at which displacements are compared; ten times as many for forces

@@ -11,7 +11,7 @@ from small_structures import chain, oscillator
 import multiphi_exudyn as mp
 from multiphi_exudyn import _core as core
 from multiphi_exudyn.time.core_levels import core_levels
-from multiphi_exudyn.time.run.chatter import limits
+from multiphi_exudyn.time.motion import limits
 from multiphi_exudyn.time.simulate import Run
 
 EXACT = 1e-12  # of the energies turned over: what round-off leaves of works in closed form

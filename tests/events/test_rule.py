@@ -24,7 +24,7 @@ from multiphi_exudyn import (
     simulate,
 )
 from multiphi_exudyn.study.stability.run_laws import complaints
-from multiphi_exudyn.time.run import chatter
+from multiphi_exudyn.time import motion as chatter
 from reference_models.rig import rig_beam, rig_contact
 
 DAMPINGS = ("none", "modal", "rayleigh", "given")

@@ -11,7 +11,7 @@ from multiphi_exudyn.exudyn_plugin import coupled as exact_motion
 from multiphi_exudyn.exudyn_plugin.attached import AttachedInertia, PointInertia
 from multiphi_exudyn.exudyn_plugin.coupled import ExactMotion, LevelForces
 from multiphi_exudyn.exudyn_plugin.interface import _direct_reactions
-from multiphi_exudyn.time.run import chatter
+from multiphi_exudyn.time import motion as chatter
 from multiphi_exudyn.time.simulate import Run
 
 T_END = 6.0

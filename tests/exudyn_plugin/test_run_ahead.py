@@ -155,8 +155,8 @@ def test_a_failure_on_the_way_is_told_when_exudyn_gets_there(monkeypatch):
     model = model_of(50.0)
     native = mp.simulate(model, T_END, velocity=VELOCITY)
     system = System(model, matchedStepSize=STEP)
-    monkeypatch.setattr("multiphi_exudyn.time.run.chatter.CHATTER_WINDOW", 4)
-    monkeypatch.setattr("multiphi_exudyn.time.run.chatter.EVENTS_PER_PERIOD", 0.01)
+    monkeypatch.setattr("multiphi_exudyn.time.motion.CHATTER_WINDOW", 4)
+    monkeypatch.setattr("multiphi_exudyn.time.motion.EVENTS_PER_PERIOD", 0.01)
     model.entries.clear()  # what it has kept of the check
     with pytest.raises(mp.MultiPhiError, match=r"body 'body': at t = .* chatter"):
         system.solve()

@@ -24,14 +24,13 @@ HEAVY = {
         "multiphi_exudyn/study",
         "multiphi_exudyn/levels/level/mode_figure.py",
         "multiphi_exudyn/levels/level/level.py",
-        "multiphi_exudyn/time/trajectory/history_figure.py",
-        "multiphi_exudyn/time/trajectory/histories.py",
+        "multiphi_exudyn/time/histories.py",
     ),
-    "pandas": ("multiphi_exudyn/study", "multiphi_exudyn/time/trajectory/histories.py"),
+    "pandas": ("multiphi_exudyn/study", "multiphi_exudyn/time/histories.py"),
     "distributed": ("multiphi_exudyn/study/sweep.py",),
     "tqdm": (*(f"multiphi_exudyn/{room}" for room in ("mathematics", "time", "study", "cli")), "reference_models"),
-    "h5py": ("multiphi_exudyn/mechanics/files/array_files.py",),
-    "pyyeti": ("multiphi_exudyn/mechanics/files/array_files.py",),
+    "h5py": ("multiphi_exudyn/mechanics/files.py",),
+    "pyyeti": ("multiphi_exudyn/mechanics/files.py",),
 }
 CORE = "multiphi_exudyn._core"
 LATE = (  # load what they name when it is asked for: a command's own module, the public names
@@ -168,7 +167,7 @@ def test_an_import_that_hides_what_it_imports_is_refused(code):
 
 LET_PASS = {
     "an earlier file": ("multiphi_exudyn.levels.model.model", "from multiphi_exudyn.levels.level.level import Level"),
-    "an earlier room": ("multiphi_exudyn.levels.model.model", "import multiphi_exudyn.mathematics.eigenproblems.modes"),
+    "an earlier room": ("multiphi_exudyn.levels.model.model", "import multiphi_exudyn.mathematics.modes"),
     "what is in it": ("multiphi_exudyn", "from multiphi_exudyn.time.simulate import simulate"),
     "the plugin": ("reference_models.rig", "from multiphi_exudyn.exudyn_plugin import reduce"),
     "a reference": ("multiphi_exudyn.study.running.runs", "from reference_models.rig import rig_beam"),
@@ -228,6 +227,6 @@ def test_the_package_shows_its_public_names_and_its_rooms_and_no_others():
     assert set(public.__all__) <= set(dir(mp))
     assert mp.__all__ == public.__all__
     assert all(getattr(mp, name) is getattr(public, name) for name in public.__all__)
-    assert mp.mechanics.beams.planar_beam.planar_beam is mp.planar_beam
+    assert mp.mechanics.beam.planar_beam is mp.planar_beam
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):
         _ = mp.simulat

@@ -11,10 +11,8 @@ from small_structures import bed, chain
 
 from multiphi_exudyn import LinearStructure, MultiPhiModel, UnilateralContact, simulate
 from multiphi_exudyn.levels.level.build_level import build_level
-from multiphi_exudyn.mathematics.eigenproblems.modes import right_singular_vectors
-from multiphi_exudyn.mechanics.beams.beam import Beam
-from multiphi_exudyn.mechanics.beams.planar_beam import planar_beam
-from multiphi_exudyn.mechanics.beams.section import Section
+from multiphi_exudyn.mathematics.modes import right_singular_vectors
+from multiphi_exudyn.mechanics.beam import Beam, Section, planar_beam
 from multiphi_exudyn.study.stability.run_laws import complaints
 
 FREQUENCIES = 1e-12  # relative, between two routes to the same modes
@@ -209,7 +207,7 @@ def test_a_hundred_stops_run_to_the_end_with_certified_events():
 
 def test_a_bed_struck_all_at_once_is_no_chatter(monkeypatch):
     """One change of every stop within a small part of a period of the highest kept mode."""
-    monkeypatch.setattr("multiphi_exudyn.time.run.chatter.CHATTER_WINDOW", 10)
+    monkeypatch.setattr("multiphi_exudyn.time.motion.CHATTER_WINDOW", 10)
     model = bed(1e7, n=200, stops=60)
     mode = model.level(()).shapes[:, 0]
     fall = -3.0 * mode / np.abs(mode).max() * np.sign(mode[len(mode) // 2])

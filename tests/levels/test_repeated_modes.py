@@ -13,8 +13,8 @@ from small_structures import chain
 import multiphi_exudyn as mp
 from multiphi_exudyn.levels.base import build_base
 from multiphi_exudyn.levels.level import level_modes
-from multiphi_exudyn.mathematics.eigenproblems import lowest_modes, modes
-from multiphi_exudyn.mechanics.structures.structure import damping_matrix
+from multiphi_exudyn.mathematics import lowest_modes, modes
+from multiphi_exudyn.mechanics.structure import damping_matrix
 
 
 def square(side, *, damping=None, stiffness=30.0, free=False, sparse=False):

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from small_structures import stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mathematics.eigenproblems import lowest_modes
+from multiphi_exudyn.mathematics import lowest_modes
 
 SIDE = 27  # of a membrane of 27 x 26 masses, none of whose frequencies are equal
 MODES = 12

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from multiphi_exudyn.mathematics.complementarity.coulomb_impacts import CoulombImpact
+from multiphi_exudyn.mathematics.coulomb_impacts import CoulombImpact
 
 
 def drawn(seed, contacts, largest):

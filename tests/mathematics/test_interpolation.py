@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from multiphi_exudyn import Smooth
-from multiphi_exudyn.mathematics.functions.interpolation import FEW_SAMPLES, MANY_SAMPLES, Samples
+from multiphi_exudyn.mathematics.interpolation import FEW_SAMPLES, MANY_SAMPLES, Samples
 
 END = 2.0
 SCALES = (2.0**-40, 1.0, 2.0**40)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.mathematics.complementarity.least_distance import Infeasible, least_distance
+from multiphi_exudyn.mathematics.least_distance import Infeasible, least_distance
 from multiphi_exudyn.mathematics.round_off import FOLLOWING, ZERO
 
 KINDS = ("random", "twice", "opposite", "dependent", "nearly")

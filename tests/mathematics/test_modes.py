@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from multiphi_exudyn import Beam, Clamp, MultiPhiValueError, NumericalFailure, Section, planar_beam
-from multiphi_exudyn.mathematics.eigenproblems import lowest_modes as lowest
-from multiphi_exudyn.mathematics.eigenproblems.lowest_modes import _Lowest, lowest_modes
-from multiphi_exudyn.mathematics.eigenproblems.modes import complete_modes, right_singular_vectors
+from multiphi_exudyn.mathematics import lowest_modes as lowest
+from multiphi_exudyn.mathematics.lowest_modes import _Lowest, lowest_modes
+from multiphi_exudyn.mathematics.modes import complete_modes, right_singular_vectors
 
 
 def chain(n, *, ends=1):

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from multiphi_exudyn import NumericalFailure
-from multiphi_exudyn.mathematics.functions.interpolation import MOST_PIECES
-from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
+from multiphi_exudyn.mathematics.interpolation import MOST_PIECES
+from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
 
 T = np.linspace(0.0, 3.0, 20_011)
 

@@ -24,7 +24,7 @@ from multiphi_exudyn import (
     planar_beam,
     simulate,
 )
-from multiphi_exudyn.mechanics.structures.structure import damping_matrix
+from multiphi_exudyn.mechanics.structure import damping_matrix
 
 CLAMPED = Clamp()
 FREE = Clamp(translation=0.0, rotation=0.0)

@@ -10,9 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from multiphi_exudyn.mechanics.beams.beam import Beam, Clamp, PointMass
-from multiphi_exudyn.mechanics.beams.planar_beam import beam_nodes, planar_beam
-from multiphi_exudyn.mechanics.beams.section import Section
+from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass, Section, beam_nodes, planar_beam
 from reference_models import rig
 from reference_models.exact_beam import exact_frequencies
 

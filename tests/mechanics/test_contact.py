@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
+from multiphi_exudyn.mechanics.contact import UnilateralContact
 
 
 def contact(**changes):

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from multiphi_exudyn.mechanics.elements.element import Element
-from multiphi_exudyn.mechanics.elements.friction import Friction
+from multiphi_exudyn.mechanics.element import Element
+from multiphi_exudyn.mechanics.friction import Friction
 
 
 def friction(**changes):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from multiphi_exudyn import MultiPhiError, MultiPhiModel, MultiPhiTypeError, MultiPhiValueError, read_structure
-from multiphi_exudyn.mechanics.files.matrix_files import read_array
+from multiphi_exudyn.mechanics.files import read_array
 
 N = 5
 MASS = scipy.sparse.csc_array(np.diag(np.arange(1.0, N + 1)))
@@ -308,7 +308,7 @@ def test_reading_output4_leaves_how_numbers_are_printed(tmp_path):
     file = write_several(tmp_path / "m.op4", {"m": np.eye(2)})
     code = (
         "import numpy as np; from pathlib import Path\n"
-        "from multiphi_exudyn.mechanics.files.array_files import op4_arrays\n"
+        "from multiphi_exudyn.mechanics.files import op4_arrays\n"
         f"op4_arrays(Path({str(file)!r})); print(str(np.float64(1) / 3))"
     )
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

@@ -12,8 +12,8 @@ from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 
 from multiphi_exudyn.errors import MultiPhiError
-from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.structure import LinearStructure
 
 MASS = np.diag([2.0, 1.0])
 STIFFNESS = np.array([[3.0, -1.0], [-1.0, 1.0]])

@@ -9,7 +9,7 @@ import scipy.sparse
 from numpy.testing import assert_allclose, assert_array_equal
 
 from multiphi_exudyn import MultiPhiError, read_structure
-from multiphi_exudyn.mechanics.files.matrix_files import read_array
+from multiphi_exudyn.mechanics.files import read_array
 
 N = 6
 MASS = np.diag(np.arange(1.0, N + 1))

@@ -6,7 +6,7 @@ import scipy.linalg
 from small_structures import chain, stop
 
 from multiphi_exudyn import LinearStructure, ModalDamping, MultiPhiModel, planar_beam, simulate
-from multiphi_exudyn.mathematics.eigenproblems.modes import complete_modes
+from multiphi_exudyn.mathematics.modes import complete_modes
 from reference_models.craig_bampton import craig_bampton, independent_points
 from reference_models.craig_bampton_run import CraigBamptonSettings, interface_contacts, solve_craig_bampton
 from reference_models.rig import rig_beam, rig_damping

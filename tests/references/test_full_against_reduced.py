@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mathematics.eigenproblems.modes import complete_modes
+from multiphi_exudyn.mathematics.modes import complete_modes
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import rig_beam, rig_damping
 

@@ -12,10 +12,8 @@ from scipy.signal import cont2discrete
 import multiphi_exudyn as mp
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin import linear_structure_from
-from multiphi_exudyn.mechanics.beams.beam import Beam, Clamp, PointMass
-from multiphi_exudyn.mechanics.beams.planar_beam import planar_beam
-from multiphi_exudyn.mechanics.beams.section import Section
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
+from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass, Section, planar_beam
+from multiphi_exudyn.mechanics.contact import UnilateralContact
 from reference_models.beam_system import build_beam_system
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.full_run import EnergyBalance, closed_intervals

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mathematics.eigenproblems.modes import complete_modes
-from multiphi_exudyn.mechanics.beams.beam import Beam
-from multiphi_exudyn.mechanics.beams.section import Section
-from multiphi_exudyn.mechanics.structures.structure import damping_matrix
+from multiphi_exudyn.mathematics.modes import complete_modes
+from multiphi_exudyn.mechanics.beam import Beam, Section
+from multiphi_exudyn.mechanics.structure import damping_matrix
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import rig_beam, rig_damping
 

@@ -7,7 +7,7 @@ import pytest
 from small_scene import changed, write
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.beams.beam import Clamp
+from multiphi_exudyn.mechanics.beam import Clamp
 from multiphi_exudyn.study.comparison.compare import compare, summary
 from multiphi_exudyn.study.running import full_runner, runner, timing
 from multiphi_exudyn.study.running.runners import run_model

@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg
 from numpy.testing import assert_allclose
 
-from multiphi_exudyn.mechanics.beams.planar_beam import planar_beam
+from multiphi_exudyn.mechanics.beam import planar_beam
 from reference_models import rig as the_rig
 from reference_models.exact_beam import exact_frequencies
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mathematics.eigenproblems.modes import complete_modes
-from multiphi_exudyn.mechanics.beams.beam import Beam
-from multiphi_exudyn.mechanics.beams.section import Section
+from multiphi_exudyn.mathematics.modes import complete_modes
+from multiphi_exudyn.mechanics.beam import Beam, Section
 from reference_models.beams import Beams
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.point_contact import Tangent

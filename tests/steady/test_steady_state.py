@@ -11,7 +11,7 @@ from small_structures import chain, oscillator, random_structure
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.steady.shooting import ATTRACTS
-from multiphi_exudyn.time.run import chatter
+from multiphi_exudyn.time import motion as chatter
 
 EXACT = 1e-8  # the round-off of finite differences, magnified by modes that hardly decay
 OWN = 1e-6  # of the integrator at its tolerances

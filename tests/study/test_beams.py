@@ -7,9 +7,7 @@ import pytest
 from small_scene import BEAM, write
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mechanics.beams.beam import Beam
-from multiphi_exudyn.mechanics.beams.planar_beam import planar_beam
-from multiphi_exudyn.mechanics.beams.section import Section
+from multiphi_exudyn.mechanics.beam import Beam, Section, planar_beam
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.scenes import load_scene

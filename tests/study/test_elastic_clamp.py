@@ -6,8 +6,7 @@ from numpy.testing import assert_allclose
 from small_scene import write
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mechanics.beams.beam import Clamp
-from multiphi_exudyn.mechanics.beams.planar_beam import planar_beam
+from multiphi_exudyn.mechanics.beam import Clamp, planar_beam
 from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.scene.mechanics import mechanics_of

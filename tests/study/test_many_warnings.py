@@ -32,8 +32,8 @@ from multiphi_exudyn.study.scene.scenes import load_scene
 from multiphi_exudyn.study.scene.workbench import prepare
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
 from multiphi_exudyn.study.stability.report import text_table
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
-from multiphi_exudyn.time.warnings.warning_groups import grouped, issue, kept_back
+from multiphi_exudyn.time.model_warnings import grouped, issue, kept_back
+from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.solver_settings import fixed_steps
 
 LINEAR = "linear range: moments differ by 30 % at the largest rotation; take a nonlinear model"

@@ -12,7 +12,7 @@ from multiphi_exudyn import (
     RayleighDamping,
     planar_beam,
 )
-from multiphi_exudyn.mechanics.structures.structure import damping_matrix
+from multiphi_exudyn.mechanics.structure import damping_matrix
 from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.running import runner, timing
 from multiphi_exudyn.study.running.runners import run_model

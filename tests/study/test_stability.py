@@ -21,7 +21,7 @@ from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
 from multiphi_exudyn.study.stability.report import render_stability, text_table
 from multiphi_exudyn.study.stability.run_laws import energy_rise
 from multiphi_exudyn.study.stability.summary import contents, failures, summaries
-from multiphi_exudyn.time.segments.segment import SegmentList
+from multiphi_exudyn.time.segments import SegmentList
 from reference_models.full_matrices import run_matrices
 
 pytestmark = pytest.mark.usefixtures("few_elements")

@@ -12,9 +12,9 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.time.core_levels import core_levels
-from multiphi_exudyn.time.reliability.defects import defects, total_defect
-from multiphi_exudyn.time.segments.segment import as_segments
+from multiphi_exudyn.time.segments import as_segments
 from multiphi_exudyn.time.simulate import Run
+from multiphi_exudyn.time.truncation import defects, total_defect
 
 
 def simulated(model, t_end, **given):

@@ -9,7 +9,7 @@ from small_structures import bed, chain, oscillator, stop
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.events.transitions.state import Phase
-from multiphi_exudyn.time.run import chatter
+from multiphi_exudyn.time import motion as chatter
 from multiphi_exudyn.time.simulate import Run
 from reference_models.rig import rig_beam, rig_contact, rig_damping
 

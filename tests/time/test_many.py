@@ -10,10 +10,10 @@ from small_structures import bed, chain, stop
 
 import multiphi_exudyn as mp
 import multiphi_exudyn._core as core
-from multiphi_exudyn.time.many import workers
-from multiphi_exudyn.time.run import chatter
-from multiphi_exudyn.time.run.motion import Motion
-from multiphi_exudyn.time.warnings.warning_groups import kept_back
+from multiphi_exudyn.time import many as workers
+from multiphi_exudyn.time import motion as chatter
+from multiphi_exudyn.time.model_warnings import kept_back
+from multiphi_exudyn.time.motion import Motion
 
 END = 6.0
 TIMES = np.linspace(0, END, 13)
@@ -222,7 +222,7 @@ class TestARunThatFails:
         assert "NaN" in found.messages[3]
         assert np.all(np.isnan(found.samples[[1, 3]]))
         assert np.all(np.isfinite(found.samples[[0, 2, 4]]))
-        monkeypatch.setattr("multiphi_exudyn.time.run.motion.limits", lambda model: (2, 1e-3))
+        monkeypatch.setattr("multiphi_exudyn.time.motion.limits", lambda model: (2, 1e-3))
         found = mp.simulate_many(model("all"), END, x[:1], points=["m5"], times=TIMES)
         assert found.status == ("failed",)
         assert "chatter" in found.messages[0]

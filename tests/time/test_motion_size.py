@@ -7,8 +7,8 @@ import pytest
 from small_structures import chain, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.time.record.record import Record
-from multiphi_exudyn.time.segments.segment import as_segments
+from multiphi_exudyn.time.record import Record
+from multiphi_exudyn.time.segments import as_segments
 from multiphi_exudyn.time.simulate import Run
 
 pytestmark = pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")

@@ -16,11 +16,11 @@ from small_structures import chain, random_model, stop
 import multiphi_exudyn as mp
 import multiphi_exudyn._core as core
 from multiphi_exudyn.events.transitions.state import event_table
-from multiphi_exudyn.time.record import recorded_segments
-from multiphi_exudyn.time.reliability.defects import defects
-from multiphi_exudyn.time.reliability.friction_warnings import friction_warnings
-from multiphi_exudyn.time.reliability.run_warnings import warnings_of
-from multiphi_exudyn.time.run import chatter
+from multiphi_exudyn.time import motion as chatter
+from multiphi_exudyn.time import record as recorded_segments
+from multiphi_exudyn.time.contact_warnings import friction_warnings
+from multiphi_exudyn.time.run_warnings import warnings_of
+from multiphi_exudyn.time.truncation import defects
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 
 END = 0.3

@@ -25,7 +25,7 @@ from multiphi_exudyn import (
     UnilateralContact,
     simulate,
 )
-from multiphi_exudyn.mechanics.loads.time_functions import Harmonic, Smooth
+from multiphi_exudyn.mechanics.time_functions import Harmonic, Smooth
 
 
 @settings(derandomize=True, max_examples=15, deadline=None)

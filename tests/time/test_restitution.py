@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from small_structures import chain, random_structure
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.mechanics.loads.time_functions import Harmonic
+from multiphi_exudyn.mechanics.time_functions import Harmonic
 from reference_models.rig import rig_beam, rig_damping
 
 G = 9.81

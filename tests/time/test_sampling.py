@@ -10,7 +10,7 @@ from small_structures import chain
 
 import multiphi_exudyn as mp
 import multiphi_exudyn._core as core
-from multiphi_exudyn.time.segments import segment
+from multiphi_exudyn.time import segments as segment
 from multiphi_exudyn.time.simulate import Run
 
 STOPS = (mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0))

@@ -14,9 +14,8 @@ from small_structures import chain, stop
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.mathematics.round_off import drop_round_off
-from multiphi_exudyn.time.run.start import first_start
-from multiphi_exudyn.time.run.start_projection import StartProjection
 from multiphi_exudyn.time.simulate import Run
+from multiphi_exudyn.time.start import StartProjection, first_start
 
 END = 2.0
 N = 6

@@ -12,9 +12,8 @@ from small_structures import chain, oscillator, random_model, stop
 
 from multiphi_exudyn import ConstantLoad, MultiPhiModel, RayleighDamping, simulate
 from multiphi_exudyn.events.transitions.state import total_impulse
-from multiphi_exudyn.time.record.record import Record
-from multiphi_exudyn.time.record.recorded_segments import Events, Recorded
-from multiphi_exudyn.time.segments.segment import SegmentList
+from multiphi_exudyn.time.record import Events, Record, Recorded
+from multiphi_exudyn.time.segments import SegmentList
 
 SOFT = 40.0
 LOAD = -0.7

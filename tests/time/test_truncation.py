@@ -10,8 +10,7 @@ from scipy.stats import spearmanr
 from small_structures import chain, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.time.reliability.defects import defects
-from multiphi_exudyn.time.reliability.truncation import run_with_enough_modes
+from multiphi_exudyn.time.truncation import defects, run_with_enough_modes
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 
 END = 0.3

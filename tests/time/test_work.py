@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from small_structures import chain, oscillator
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.time.segments.segment import SegmentList, as_segments
+from multiphi_exudyn.time.segments import SegmentList, as_segments
 from multiphi_exudyn.time.simulate import Run
 
 COMPLIANT = (mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0))

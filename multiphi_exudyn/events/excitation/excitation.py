@@ -20,8 +20,8 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.events.excitation.load_channels import LoadChannels, columns, load_label, static_load
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential, differentiated, translated
-from multiphi_exudyn.mechanics.loads.loads import Load
+from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential, differentiated, translated
+from multiphi_exudyn.mechanics.loads import Load
 
 __all__ = ["Drive", "Excitation"]
 

@@ -15,13 +15,18 @@ import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mathematics.functions.piecewise_exponential import PiecewiseExponential
-from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
-from multiphi_exudyn.mechanics.loads.loads import Load, VaryingLoad
-from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion, StopsMotion
-from multiphi_exudyn.mechanics.loads.samples import Sampled
-from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
-from multiphi_exudyn.mechanics.loads.time_functions import TimeFunction
+from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
+from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.loads import (
+    BaseMotion,
+    ConstantLoad,
+    Gravity,
+    Load,
+    StopMotion,
+    StopsMotion,
+    VaryingLoad,
+)
+from multiphi_exudyn.mechanics.time_functions import Sampled, TimeFunction
 
 __all__ = ["LoadChannels", "columns", "load_label", "static_load"]
 

@@ -14,7 +14,7 @@ import numpy as np
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.state import Row
 from multiphi_exudyn.mathematics.round_off import ZERO
-from multiphi_exudyn.mechanics.elements.element import ElementState, Exit
+from multiphi_exudyn.mechanics.element import ElementState, Exit
 
 __all__ = ["asked_state", "exits_of", "force_shares", "signal_rows", "signal_table", "state_of"]
 

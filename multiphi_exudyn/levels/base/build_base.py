@@ -13,13 +13,13 @@ import numpy as np
 import scipy.sparse
 
 from multiphi_exudyn.levels.base.modal_base import ModalBase, parallel
-from multiphi_exudyn.mathematics.eigenproblems.lowest_modes import HeldRows, LowestModes, lowest_modes
-from multiphi_exudyn.mathematics.eigenproblems.modes import Modes, complete_modes
+from multiphi_exudyn.mathematics.lowest_modes import HeldRows, LowestModes, lowest_modes
+from multiphi_exudyn.mathematics.modes import Modes, complete_modes
 from multiphi_exudyn.mathematics.round_off import drop_round_off
-from multiphi_exudyn.mechanics.elements.element import AnyLink, Element, Link, link_indices, links_of
-from multiphi_exudyn.mechanics.structures.arguments import Matrix
-from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.element import AnyLink, Element, Link, link_indices, links_of
+from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["COMPLETE", "build_base"]
 

@@ -24,11 +24,11 @@ from multiphi_exudyn._core import are_independent
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mathematics.eigenproblems.modes import Modes
+from multiphi_exudyn.mathematics.modes import Modes
 from multiphi_exudyn.mathematics.round_off import drop_round_off
-from multiphi_exudyn.mechanics.elements.element import Element
-from multiphi_exudyn.mechanics.elements.element_table import ElementTable
-from multiphi_exudyn.mechanics.structures.arguments import Matrix
+from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.element import Element
+from multiphi_exudyn.mechanics.element_table import ElementTable
 
 __all__ = ["ModalBase", "parallel"]
 

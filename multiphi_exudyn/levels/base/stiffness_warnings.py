@@ -10,8 +10,8 @@ import numpy as np
 import scipy.sparse
 
 from multiphi_exudyn.display import per_cent
-from multiphi_exudyn.mathematics.eigenproblems.modes import ROUND_OFF, Modes, round_off_energy
-from multiphi_exudyn.mathematics.eigenproblems.stiffness_digits import (
+from multiphi_exudyn.mathematics.modes import ROUND_OFF, Modes, round_off_energy
+from multiphi_exudyn.mathematics.stiffness_digits import (
     CERTAIN,
     digits_of,
     doubled_product,

@@ -17,7 +17,7 @@ import scipy.optimize
 from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.levels.base.modal_base import ModalBase
-from multiphi_exudyn.mathematics.complementarity.least_distance import least_distance
+from multiphi_exudyn.mathematics.least_distance import least_distance
 from multiphi_exudyn.mathematics.round_off import FOLLOWING, INDEPENDENT
 
 __all__ = ["equilibrium_on_contacts"]

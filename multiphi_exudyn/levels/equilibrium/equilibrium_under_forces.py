@@ -22,7 +22,7 @@ from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.equilibrium.equilibrium_on_contacts import equilibrium_on_contacts
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import equilibrium_along_path
 from multiphi_exudyn.levels.level.build_level import build_level
-from multiphi_exudyn.mathematics.complementarity.least_distance import Infeasible, least_distance
+from multiphi_exudyn.mathematics.least_distance import Infeasible, least_distance
 from multiphi_exudyn.mathematics.round_off import BALANCED, drop_round_off
 
 __all__ = ["equilibrium_under_forces"]

@@ -34,7 +34,7 @@ import numpy as np
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.equilibrium.sliding_equilibrium import static_response_with_friction
-from multiphi_exudyn.mechanics.elements.element import ElementState, Exit
+from multiphi_exudyn.mechanics.element import ElementState, Exit
 
 __all__ = ["Equilibrium", "equilibrium_along_path"]
 

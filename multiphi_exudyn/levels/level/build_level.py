@@ -12,7 +12,7 @@ from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.level.level_modes import level_modes
 from multiphi_exudyn.levels.level.level_rows import level_rows
-from multiphi_exudyn.mathematics.eigenproblems.modes import aligned_clusters, cluster_end
+from multiphi_exudyn.mathematics.modes import aligned_clusters, cluster_end
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 
 __all__ = ["build_level", "drop_damping_of_free_modes"]

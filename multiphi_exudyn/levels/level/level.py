@@ -32,9 +32,9 @@ from multiphi_exudyn.levels.level.static_response import (
     response_of_neutral_level,
     static_response,
 )
-from multiphi_exudyn.mathematics.eigenproblems.modes import cluster_end
+from multiphi_exudyn.mathematics.modes import cluster_end
 from multiphi_exudyn.mathematics.round_off import BALANCED, SLOW, ZERO, drop_round_off
-from multiphi_exudyn.mechanics.structures.arguments import real_array
+from multiphi_exudyn.mechanics.arguments import real_array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -37,7 +37,7 @@ import multiphi_exudyn._core as core
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
 from multiphi_exudyn.levels.base.modal_base import ModalBase
-from multiphi_exudyn.mathematics.eigenproblems.modes import right_singular_vectors
+from multiphi_exudyn.mathematics.modes import right_singular_vectors
 from multiphi_exudyn.mathematics.orthonormal import product_error, without
 
 __all__ = ["level_modes"]

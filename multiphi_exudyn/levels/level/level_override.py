@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.structures.arguments import real_array
+from multiphi_exudyn.mechanics.arguments import real_array
 
 __all__ = ["LevelOverride"]
 

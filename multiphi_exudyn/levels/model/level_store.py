@@ -15,9 +15,9 @@ from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.model.mode_choice import FIRST
 from multiphi_exudyn.mathematics.blas_threads import one_blas_thread
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mathematics.eigenproblems.lowest_modes import missing_flexibility
-from multiphi_exudyn.mechanics.elements.element import Element
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mathematics.lowest_modes import missing_flexibility
+from multiphi_exudyn.mechanics.element import Element
+from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["LevelStore"]
 

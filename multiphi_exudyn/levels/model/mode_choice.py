@@ -29,8 +29,8 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.level.level import Level
-from multiphi_exudyn.mechanics.structures.arguments import is_real
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.arguments import is_real
+from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["CONTACT_SHARE", "FIRST", "MOST", "SMALL", "TRIED", "Tolerance", "UpTo", "choose_mode_count", "is_count"]
 

@@ -28,8 +28,8 @@ from multiphi_exudyn.levels.model.model_arguments import (
 )
 from multiphi_exudyn.levels.model.shared_base import SharedBase
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mechanics.elements.element import Element
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.element import Element
+from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["MultiPhiModel"]
 

@@ -10,8 +10,8 @@ import numpy as np
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.level.level_override import LevelOverride
 from multiphi_exudyn.levels.model.mode_choice import Tolerance, UpTo, is_count
-from multiphi_exudyn.mechanics.elements.element import AnyLink, Element
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.element import AnyLink, Element
+from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["check_directions", "check_modes", "check_overrides", "checked_contacts"]
 

@@ -10,8 +10,8 @@ import numpy as np
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.model.level_store import LevelStore
 from multiphi_exudyn.levels.model.mode_choice import SMALL, TRIED, Tolerance, UpTo, choose_mode_count
-from multiphi_exudyn.mechanics.elements.element_table import ElementTable
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.element_table import ElementTable
+from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["SharedBase"]
 

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.structures.arguments import one_of
+from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.study.accuracy.study_file import COARSER, REFERENCE, MethodSpec, StudyFile, is_number
 from multiphi_exudyn.study.running.environment import machine
 from multiphi_exudyn.study.scene.mechanics import mechanics_of

@@ -34,7 +34,7 @@ from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.workbench import Setup, prepare
 from multiphi_exudyn.study.store import Row, Store
 from multiphi_exudyn.study.sweep import Function, Outcome, sweep
-from multiphi_exudyn.time.warnings.warning_groups import kept_back
+from multiphi_exudyn.time.model_warnings import kept_back
 
 __all__ = ["BudgetRun", "MeasuredRun", "TimedRun", "TimedTurns", "run_study"]
 

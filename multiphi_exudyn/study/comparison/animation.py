@@ -24,7 +24,7 @@ from matplotlib.lines import Line2D
 from PIL import Image
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.structures.arguments import one_of
+from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.study.comparison.beam_places import coefficients
 from multiphi_exudyn.study.comparison.figure_style import BAND, COLOURS, REFERENCE, STYLE, panels
 from multiphi_exudyn.study.comparison.plots import grey_spans

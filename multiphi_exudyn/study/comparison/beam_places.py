@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
+from multiphi_exudyn.mechanics.contact import UnilateralContact
 from reference_models.beams import Beams
 
 __all__ = ["beam_places", "coefficients"]

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.study.comparison.beam_places import coefficients
 from multiphi_exudyn.study.comparison.compare import MOST_LISTED, Comparison
 from multiphi_exudyn.study.comparison.pages import sentences

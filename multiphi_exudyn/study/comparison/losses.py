@@ -16,8 +16,8 @@ from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import interval_array
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart
 from multiphi_exudyn.study.scene.workbench import Setup, start_configuration
+from multiphi_exudyn.time.model_warnings import kept_back
 from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
 __all__ = ["loss_tables"]
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
+from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.study.comparison.beam_places import beam_places, coefficients
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.figure_style import COLOURS, LINE, STYLE, WIDTH

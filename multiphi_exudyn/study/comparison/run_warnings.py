@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from multiphi_exudyn.study.comparison.wording import share
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF
-from multiphi_exudyn.time.warnings.warning_groups import grouped
+from multiphi_exudyn.time.model_warnings import grouped
 
 __all__ = ["run_warnings"]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.structures.structure import damping_matrix
+from multiphi_exudyn.mechanics.structure import damping_matrix
 from multiphi_exudyn.study.running.runner import Runner
 from multiphi_exudyn.study.running.runs import interval_array
 from multiphi_exudyn.study.scene.scene_file import DisplacedStart

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.scene.mechanics import mechanics_of
 from multiphi_exudyn.study.scene.model_kinds import ReducedModel
 from multiphi_exudyn.study.scene.scenes import Scene

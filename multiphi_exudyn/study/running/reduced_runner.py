@@ -13,14 +13,14 @@ import numpy as np
 
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.running.runner import ENERGY_INTERVAL, Runner, modes_text
 from multiphi_exudyn.study.running.runs import interval_array
 from multiphi_exudyn.study.running.timing import timed
 from multiphi_exudyn.study.scene.workbench import start_equilibrium
-from multiphi_exudyn.time.reliability.truncation import truncation_indicator
 from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.truncation import truncation_indicator
 from reference_models.global_basis import global_basis
 from reference_models.pod_basis import pod_basis
 

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from multiphi_exudyn.levels.model.model import MultiPhiModel
+from multiphi_exudyn.time.model_warnings import kept_back
 from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.warnings.warning_groups import kept_back
 
 __all__ = ["run_alone"]
 

@@ -16,7 +16,7 @@ from multiphi_exudyn.study.running.runner import Runner
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.running.stepwise_runner import SplittingRunner, StepwiseRunner
 from multiphi_exudyn.study.scene.workbench import Setup
-from multiphi_exudyn.time.warnings.warning_groups import kept_back
+from multiphi_exudyn.time.model_warnings import kept_back
 
 __all__ = ["ready_model", "run_model"]
 

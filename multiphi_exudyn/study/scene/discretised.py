@@ -12,10 +12,9 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
-from multiphi_exudyn.mechanics.beams.beam import Beam, Clamp
-from multiphi_exudyn.mechanics.beams.planar_beam import planar_beam
-from multiphi_exudyn.mechanics.structures.assembly import Assembly, assemble
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.assembly import Assembly, assemble
+from multiphi_exudyn.mechanics.beam import Beam, Clamp, planar_beam
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from reference_models.beams import Beams
 from reference_models.full_beam import FullBeam, FullBeamSettings
 

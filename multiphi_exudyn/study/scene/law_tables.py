@@ -3,9 +3,9 @@
     force on the structure -F(q) along the row p of ``at``, a point name or {point: coefficient};   q = p.x [m]
 
 A positive slope of F is a spring that pulls back. A shape is followed by straight segments on its ``span``, to a
-``tolerance`` or by so many ``segments`` (multiphi_exudyn.mechanics.elements.force_law); the full beam has the shape
+``tolerance`` or by so many ``segments`` (multiphi_exudyn.mechanics.force_law); the full beam has the shape
 itself.
-Every table gives its law of multiphi_exudyn.mechanics.elements.force_law, and itself in words.
+Every table gives its law of multiphi_exudyn.mechanics.force_law, and itself in words.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
+from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.study.scene.fields import Finite, Name, NotZero, Place, Positive, Table, place_phrase
 
 __all__ = ["CubicLawSpec", "HertzLawSpec", "LawSpec", "MagnetLawSpec", "TableLawSpec"]

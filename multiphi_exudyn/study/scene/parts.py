@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import scipy.sparse
 
-from multiphi_exudyn.mechanics.beams.beam import Beam
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
-from multiphi_exudyn.mechanics.elements.friction import Friction
-from multiphi_exudyn.mechanics.structures.arguments import Matrix
-from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.beam import Beam
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.scene.load_tables import BaseMotionSpec, GravitySpec, LoadSpec, StopMotionSpec
 from reference_models.beams import Beams
 from reference_models.rig import published_override

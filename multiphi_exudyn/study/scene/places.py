@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.structures.arguments import one_of
+from multiphi_exudyn.mechanics.arguments import one_of
 
 __all__ = ["with_value"]
 

@@ -11,9 +11,9 @@ from typing import Annotated
 
 from pydantic import Field, Tag
 
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.elements.friction import Friction
-from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.study.scene.fields import (
     Finite,
     Name,

@@ -1,4 +1,4 @@
-"""The loads of a scene file as loads of multiphi_exudyn.mechanics.loads.loads, and as phrases.
+"""The loads of a scene file as loads of multiphi_exudyn.mechanics.loads, and as phrases.
 
 Weight and base motion act along a unit rigid-body motion of the structure; a beam's is its transverse one, which
 depends on its mesh and is an argument here.
@@ -11,12 +11,18 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from multiphi_exudyn.mechanics.loads.loads import HarmonicLoad, Load, SampledLoad, SweepLoad
-from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion
-from multiphi_exudyn.mechanics.loads.samples import Accelerogram, Sampled
-from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
-from multiphi_exudyn.mechanics.loads.time_functions import Harmonic, Sweep, TimeFunction
-from multiphi_exudyn.mechanics.structures.structure import At
+from multiphi_exudyn.mechanics.loads import (
+    BaseMotion,
+    ConstantLoad,
+    Gravity,
+    HarmonicLoad,
+    Load,
+    SampledLoad,
+    StopMotion,
+    SweepLoad,
+)
+from multiphi_exudyn.mechanics.structure import At
+from multiphi_exudyn.mechanics.time_functions import Accelerogram, Harmonic, Sampled, Sweep, TimeFunction
 from multiphi_exudyn.study.scene.fields import inside, place_phrase
 from multiphi_exudyn.study.scene.load_tables import (
     AccelerogramCourse,

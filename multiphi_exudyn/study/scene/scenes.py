@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.structures.arguments import one_of
+from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.study.scene.model_kinds import ModelSpec
 from multiphi_exudyn.study.scene.scene_file import SceneFile
 from multiphi_exudyn.study.scene.toml_file import read_toml, validated

@@ -15,10 +15,9 @@ import scipy.sparse
 from pydantic import Field, Tag
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.beams.beam import Beam, Clamp, PointMass
-from multiphi_exudyn.mechanics.beams.section import Section
-from multiphi_exudyn.mechanics.files.matrix_files import read_array, read_arrays, read_structure
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.beam import Beam, Clamp, PointMass, Section
+from multiphi_exudyn.mechanics.files import read_array, read_arrays, read_structure
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.scene.fields import (
     Finite,
     Name,

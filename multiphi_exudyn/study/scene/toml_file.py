@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.structures.arguments import did_you_mean
+from multiphi_exudyn.mechanics.arguments import did_you_mean
 
 if sys.version_info >= (3, 11):
     import tomllib

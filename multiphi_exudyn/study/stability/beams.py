@@ -10,14 +10,12 @@ import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 
-from multiphi_exudyn.mechanics.beams.beam import Beam, PointMass
-from multiphi_exudyn.mechanics.beams.planar_beam import planar_beam
-from multiphi_exudyn.mechanics.beams.section import Section
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.beam import Beam, PointMass, Section, planar_beam
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.structures import differs, pulled, rig_problem, stop
 from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.rig import rig_beam, rig_contact
 
 __all__ = ["CASES"]

@@ -21,10 +21,9 @@ import numpy as np
 
 from multiphi_exudyn.events.transitions.exits import exits_of
 from multiphi_exudyn.events.transitions.state import Phase
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.loads.loads import Load
-from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.loads import BaseMotion, Load, StopMotion
+from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = [
     "ContactSamples",

@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.beams.beam import Beam
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
-from multiphi_exudyn.mechanics.elements.friction import Friction
-from multiphi_exudyn.mechanics.loads.loads import Load
-from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.mechanics.beam import Beam
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
+from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["STATIC_LOADS", "Case", "Problem", "Pull"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.mechanics.structures.arguments import one_of
+from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.study.stability import beams, driven, friction, laws, starts, systems
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.exudyn_runs import (
@@ -16,7 +16,7 @@ from multiphi_exudyn.study.stability.exudyn_runs import (
 )
 from multiphi_exudyn.study.stability.native_run import Native, run_native
 from multiphi_exudyn.study.stability.outcome import NOT_RUN, CaseResult, Outcome
-from multiphi_exudyn.time.warnings.warning_groups import kept_back
+from multiphi_exudyn.time.model_warnings import kept_back
 
 __all__ = ["CATALOGUE", "FULL_LENGTH", "QUICK", "Limits", "chosen_cases", "run_case"]
 

@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.loads.loads import HarmonicLoad, SampledLoad
-from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion
-from multiphi_exudyn.mechanics.loads.time_functions import Harmonic
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.loads import BaseMotion, HarmonicLoad, SampledLoad, StopMotion
+from multiphi_exudyn.mechanics.time_functions import Harmonic
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.starts import BILINEAR
 from multiphi_exudyn.study.stability.structures import STOP, in_a_row, stop, two_masses

@@ -14,14 +14,14 @@ from dataclasses import replace
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.loads.loads import FunctionLoad, HarmonicLoad, SampledLoad, SweepLoad
-from multiphi_exudyn.mechanics.structures.structure import damping_matrix
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.loads import FunctionLoad, HarmonicLoad, SampledLoad, SweepLoad
+from multiphi_exudyn.mechanics.structure import damping_matrix
 from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.stability.brute_force import highest_frequency
 from multiphi_exudyn.study.stability.case import STATIC_LOADS, Problem, Pull
 from multiphi_exudyn.study.stability.outcome import FAILED, NOT_RUN, OK, Outcome
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.body_alone import solve_body_alone
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.full_matrices import run_matrices

@@ -6,15 +6,14 @@ import math
 
 import numpy as np
 
-from multiphi_exudyn.mechanics.beams.planar_beam import planar_beam
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.elements.friction import Friction
-from multiphi_exudyn.mechanics.loads.loads import HarmonicLoad, Load, SampledLoad
-from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad
-from multiphi_exudyn.mechanics.structures.assembly import assemble
+from multiphi_exudyn.mechanics.assembly import assemble
+from multiphi_exudyn.mechanics.beam import planar_beam
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.mechanics.loads import ConstantLoad, HarmonicLoad, Load, SampledLoad
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.structures import chain, in_a_row, stop, two_masses
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.rig import rig_beam, rig_damping
 
 __all__ = ["CASES"]

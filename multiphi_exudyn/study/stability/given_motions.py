@@ -9,13 +9,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.loads.loads import FunctionLoad, Load, SweepLoad
-from multiphi_exudyn.mechanics.loads.moving_supports import BaseMotion, StopMotion, StopsMotion
-from multiphi_exudyn.mechanics.loads.samples import Accelerogram, Sampled
-from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
-from multiphi_exudyn.mechanics.loads.time_functions import Harmonic, Smooth, Sweep, TimeFunction
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.loads import (
+    BaseMotion,
+    ConstantLoad,
+    FunctionLoad,
+    Gravity,
+    Load,
+    StopMotion,
+    StopsMotion,
+    SweepLoad,
+)
+from multiphi_exudyn.mechanics.structure import LinearStructure
+from multiphi_exudyn.mechanics.time_functions import Accelerogram, Harmonic, Sampled, Smooth, Sweep, TimeFunction
 
 __all__ = ["approximated", "forces_at", "stop_motion", "value_at"]
 

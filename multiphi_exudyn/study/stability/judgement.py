@@ -22,9 +22,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
-from multiphi_exudyn.mechanics.elements.friction import Friction
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.study.stability import run_laws
 from multiphi_exudyn.study.stability.brute_force import (
     ContactSamples,
@@ -37,7 +37,7 @@ from multiphi_exudyn.study.stability.brute_force import (
 )
 from multiphi_exudyn.study.stability.case import Problem
 from multiphi_exudyn.study.stability.law_check import broken_laws
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["BEYOND", "Judgement", "judge"]
 

@@ -34,18 +34,17 @@ import scipy.sparse
 from scipy.optimize import lsq_linear
 
 from multiphi_exudyn.events.transitions.state import event_table
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.elements.element import Element
-from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
-from multiphi_exudyn.mechanics.elements.friction import Friction
-from multiphi_exudyn.mechanics.loads.loads import Load
-from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad, Gravity
-from multiphi_exudyn.mechanics.loads.time_functions import Harmonic
-from multiphi_exudyn.mechanics.structures.damping import ModalDamping
-from multiphi_exudyn.mechanics.structures.structure import damping_matrix
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.damping import ModalDamping
+from multiphi_exudyn.mechanics.element import Element
+from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
+from multiphi_exudyn.mechanics.structure import damping_matrix
+from multiphi_exudyn.mechanics.time_functions import Harmonic
 from multiphi_exudyn.study.stability.given_motions import approximated, forces_at, stop_motion
-from multiphi_exudyn.time.segments.segment import as_segments
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.segments import as_segments
+from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["broken_laws"]
 

@@ -11,7 +11,7 @@ from multiphi_exudyn.study.stability.judgement import judge
 from multiphi_exudyn.study.stability.outcome import FAILED, OK, Outcome
 from multiphi_exudyn.study.sweep import TimeLimitExceeded, call_within
 from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["NATIVE", "Native", "run_native"]
 

@@ -14,12 +14,12 @@ import numpy as np
 from multiphi_exudyn.events.transitions.state import Phase, total_loss
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.round_off import ZERO
-from multiphi_exudyn.mechanics.elements.element import Element
-from multiphi_exudyn.mechanics.elements.friction import Friction
+from multiphi_exudyn.mechanics.element import Element
+from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.study.stability.run_signals import Signal
-from multiphi_exudyn.time.segments.segment import Segment, as_segments
-from multiphi_exudyn.time.trajectory.ledger import Ledger
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.ledger import Ledger
+from multiphi_exudyn.time.segments import Segment, as_segments
+from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["complaints", "ends_of", "energy_rise", "largest_energy", "missed", "still"]
 

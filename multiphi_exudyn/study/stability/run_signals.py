@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from multiphi_exudyn.time.segments.segment import Segment
+from multiphi_exudyn.time.segments import Segment
 
 __all__ = ["Signal"]
 

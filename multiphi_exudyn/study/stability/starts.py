@@ -11,7 +11,7 @@ import numpy as np
 
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.structures import STOP, in_a_row, rig_problem, stop
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.exact import BilinearOscillator, PlasticImpact
 
 __all__ = ["CASES"]

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.beams.beam import Beam
-from multiphi_exudyn.mechanics.elements.contact import UnilateralContact
-from multiphi_exudyn.mechanics.elements.force_law import ForceLaw
-from multiphi_exudyn.mechanics.elements.friction import Friction
-from multiphi_exudyn.mechanics.structures.arguments import Matrix
-from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.structures.structure import At, LinearStructure
+from multiphi_exudyn.mechanics.arguments import Matrix
+from multiphi_exudyn.mechanics.beam import Beam
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.mechanics.structure import At, LinearStructure
 from multiphi_exudyn.study.stability.case import Problem, Pull
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import rig_beam, rig_contact
 

@@ -12,7 +12,7 @@ from multiphi_exudyn.study.comparison.pages import sentences
 from multiphi_exudyn.study.stability.judgement import BEYOND
 from multiphi_exudyn.study.stability.outcome import FAILED, NOT_RUN, OK, CaseResult, Outcome
 from multiphi_exudyn.study.stability.run_laws import CLOSES
-from multiphi_exudyn.time.warnings.warning_groups import grouped
+from multiphi_exudyn.time.model_warnings import grouped
 
 __all__ = ["contents", "failures", "headline", "summaries", "warned"]
 

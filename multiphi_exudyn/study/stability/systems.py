@@ -8,14 +8,14 @@ from functools import partial
 
 import numpy as np
 
-from multiphi_exudyn.mechanics.loads.static_loads import ConstantLoad
-from multiphi_exudyn.mechanics.structures.damping import ModalDamping, RayleighDamping
-from multiphi_exudyn.mechanics.structures.structure import LinearStructure
+from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
+from multiphi_exudyn.mechanics.loads import ConstantLoad
+from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.starts import BILINEAR
 from multiphi_exudyn.study.stability.structures import differs, in_a_row, rig_problem, stop
 from multiphi_exudyn.time.simulate import simulate
-from multiphi_exudyn.time.trajectory.trajectory import Trajectory
+from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.bars import clamped_bar, free_bar, nodes
 from reference_models.exact import BouncingBar
 

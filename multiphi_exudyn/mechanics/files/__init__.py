@@ -1,4 +1,0 @@
-"""Files: structures read from matrix files of other codes.
-
-Order: text_matrices, array_files, matrix_files.
-"""
