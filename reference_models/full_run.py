@@ -80,7 +80,7 @@ class FullRun:
     friction_force: friction -> T (k,) [N]; slip: friction -> way (k,) [m] of its patch on the counter-surface.
     energy_time (j,) [s], energy (j,) [J]: kinetic, strain and contact springs; balance: its summary.
     start_force [N], zero for a start at rest where it is straight; steps: accepted time steps; dofs: free coordinates.
-    offline_s: building and static start; online_s: the dynamic solver alone, wall clock [s].
+    offline_s: building and static start; online_s: the dynamic solver alone; CPU time [s].
     """
 
     status: str

@@ -17,10 +17,10 @@ __all__ = ["Integration", "integrate"]
 
 @dataclass(frozen=True)
 class Integration:
-    """cause: why the solver stopped early, or ""; wall_s: wall clock of the solver [s]."""
+    """cause: why the solver stopped early, or ""; cpu_s: CPU time of the solver [s]."""
 
     cause: str
-    wall_s: float
+    cpu_s: float
 
 
 def integrate(
@@ -31,11 +31,11 @@ def integrate(
     if drive is not None:
         drive(mbs, 0.0)
         mbs.SetPreStepUserFunction(drive)
-    started = time.perf_counter()
+    started = time.process_time()
     try:
         with cpu_limit(cpu_limit_s), interruptible(recorder.stop):
             cause = _solve(mbs, simulation_settings, cpu_limit_s)
-        return Integration(cause, time.perf_counter() - started)
+        return Integration(cause, time.process_time() - started)
     finally:
         mbs.SetPostStepUserFunction(0)  # it refers to the system, which would keep both alive
         if drive is not None:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models,
 from multiphi_exudyn.study.running.environment import load_average
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.model_kinds import ReducedModel, UserObjectModel
+from multiphi_exudyn.study.scene.model_kinds import CraigBamptonModel, ReducedModel, UserObjectModel
 from multiphi_exudyn.study.scene.workbench import ROUND_OFF, Setup
 from multiphi_exudyn.study.store import plain
 
@@ -54,6 +55,18 @@ class Comparison:
     def cheapest(self) -> tuple[ModelRun, ...]:
         """The full model at its cheapest fair setting, at nearby steps."""
         return tuple(self.runs[name] for name in self.setup.scene.file.comparison.cheapest)
+
+    @property
+    def components(self) -> list[tuple[ModelRun, ...]]:
+        """Exudyn's own linear component, setting by setting: runs with one number of modes, at nearby steps."""
+        measured = self.measured
+        found = ([measured[name] for name in names if name in measured] for names in _components(self.setup))
+        return [tuple(runs) for runs in found if runs]
+
+    @property
+    def nearby(self) -> set[str]:
+        """Names of the runs that only show that a setting holds at nearby steps."""
+        return _nearby(self.setup)
 
     @property
     def measured(self) -> dict[str, ModelRun]:
@@ -92,6 +105,15 @@ class Comparison:
     def worst_error(self, run: ModelRun, until: float) -> float:
         """Largest NRMSE of the judged points."""
         return max(self.error(run, point, until) for point in self.setup.judged_points)
+
+    def worst_of(self, runs: Sequence[ModelRun], until: float) -> float:
+        """The same of the worst of a setting's runs at nearby steps."""
+        return max(self.worst_error(run, until) for run in runs)
+
+    def component_within(self, tolerance: float) -> tuple[ModelRun, ...]:
+        """The fastest setting of the linear component that holds at all its steps, in the headline's window."""
+        within = [runs for runs in self.components if self.worst_of(runs, self.headline_window) <= tolerance]
+        return min(within, key=lambda runs: runs[0].online_s, default=())
 
     def stiff_error(self, run: ModelRun, until: float) -> float:
         """Largest NRMSE of the judged points of one of the ``rigid`` runs to the stiff stops."""
@@ -156,11 +178,26 @@ def compare(
     fails is tried again at gentler settings, and its row says so.
     """
     runs, loads = {}, []
+    once, nearby = replace(setup, repeats=0), _nearby(setup)
     for name in setup.scene.models:
         started(name)
-        runs[name] = run_model(setup, name, progress, retry=True, horizon=True)
+        runs[name] = run_model(once if name in nearby else setup, name, progress, retry=True, horizon=True)
         loads.append(load_average() or 0.0)
     return Comparison(setup, runs, {**environment, "load_average": max(loads)}, stiff_stops(setup))
+
+
+def _components(setup: Setup) -> list[list[str]]:
+    """Names of the models that are Exudyn's linear component, those of one number of modes together."""
+    settings = defaultdict[int, list[str]](list)
+    for name, model in setup.scene.models.items():
+        if isinstance(model, CraigBamptonModel):
+            settings[model.modes].append(name)
+    return list(settings.values())
+
+
+def _nearby(setup: Setup) -> set[str]:
+    settings = [setup.scene.file.comparison.cheapest, *_components(setup)]
+    return {name for names in settings for name in names[1:]}
 
 
 def summary(comparison: Comparison) -> dict[str, Any]:

@@ -47,7 +47,10 @@ def findings(comparison: Comparison) -> dict[str, tuple[str, ...]]:
         best=None if best in headline else best,
         failed=[run for run in comparison.runs.values() if not run.ok],
         cheapest=cheapest,
-        cheapest_worst=max(cheapest, key=lambda run: _error(comparison, run), default=None),
+        cheapest_error=max((_error(comparison, run) for run in cheapest), default=math.inf),
+        component=comparison.component_within(math.inf),
+        component_as_accurate=lambda run: comparison.component_within(max(_error(comparison, run), _own(comparison))),
+        unjudged=[name for name in setup.points if name not in setup.judged_points],
         own=comparison.coarser,
         places=_places(setup),
         load=comparison.environment.get("load_average", 0.0),
@@ -109,6 +112,12 @@ def _error(comparison: Comparison, run: ModelRun) -> float:
     return comparison.worst_error(run, comparison.headline_window) if has_error else math.inf
 
 
+def _own(comparison: Comparison) -> float:
+    """The reference's own uncertainty in the headline's window; 0 where it is unknown."""
+    own = comparison.coarser
+    return 0.0 if own is None else _error(comparison, own)
+
+
 def _most_accurate(comparison: Comparison, kind: str) -> ModelRun | None:
     runs = [run for run in comparison.measured.values() if run.kind == kind]
     return min(runs, key=lambda run: _error(comparison, run), default=None)
@@ -116,8 +125,7 @@ def _most_accurate(comparison: Comparison, kind: str) -> ModelRun | None:
 
 def _headline_runs(comparison: Comparison) -> list[ModelRun]:
     """Fastest accurate run of each kind (else its most accurate one), then the scene's first reduced model."""
-    own, runs = comparison.coarser, list(comparison.measured.values())
-    floor = max(HEADLINE_ERROR, _error(comparison, own) if own is not None else 0.0)
+    runs, floor = list(comparison.measured.values()), max(HEADLINE_ERROR, _own(comparison))
     names = []
     for kind in ("reduced", "user-object"):
         accurate = [run for run in runs if run.kind == kind and _error(comparison, run) <= floor]

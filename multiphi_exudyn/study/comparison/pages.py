@@ -13,7 +13,16 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from multiphi_exudyn.study.comparison.figure_style import data_uri
-from multiphi_exudyn.study.comparison.wording import engineering, listed, percent, seconds, sentence, share, times
+from multiphi_exudyn.study.comparison.wording import (
+    engineering,
+    faster,
+    listed,
+    percent,
+    seconds,
+    sentence,
+    share,
+    times,
+)
 
 __all__ = ["Picture", "embedded", "environment_of", "sentences"]
 
@@ -43,7 +52,7 @@ def html(frame: pd.DataFrame) -> Markup:
     return Markup(frame.to_html(border=0, index_names=frame.columns.name is not None))
 
 
-FILTERS = (embedded, engineering, html, listed, percent, seconds, sentence, share, times)
+FILTERS = (embedded, engineering, faster, html, listed, percent, seconds, sentence, share, times)
 
 
 def environment_of(package: str) -> Environment:

@@ -84,7 +84,7 @@ def styles(comparison: Comparison) -> dict[str, Style]:
     for name, run in comparison.runs.items():
         if run is comparison.reference:
             drawn[name] = Style(REFERENCE, MARKERS[run.kind], width=WIDEST + 1)
-        elif run.kind == "full":
+        elif run.kind == "full" or name in comparison.nearby:
             drawn[name] = Style(FULL, MARKERS[run.kind], width=NARROWEST)
         elif run.kind == "user-object":
             drawn[name] = Style(next(colours), MARKERS[run.kind], DOTS, DOT)
@@ -125,7 +125,7 @@ def error_time_figure(comparison: Comparison) -> Figure:
     axes.set(xscale="log", yscale="log", xlabel="online time")
     axes.margins(0.12)
     for name, run in comparison.measured.items():
-        label = None if run in comparison.cheapest[1:] else run.label
+        label = None if name in comparison.nearby else run.label
         axes.plot(run.online_s, 100 * comparison.worst_error(run, until), **style[name].marks, label=label)
     for name, run in comparison.rigid.items():
         hollow = style[name].marks | {"mfc": "none", "mec": style[name].colour}
@@ -244,7 +244,7 @@ def first_contact_span(comparison: Comparison, contacts: Iterable[str] | None = 
 
 def _reduced(comparison: Comparison) -> list[ModelRun]:
     """Runs, with an error, of all models but full ones."""
-    return [run for run in comparison.measured.values() if run.kind != "full"]
+    return [run for name, run in comparison.measured.items() if run.kind != "full" and name not in comparison.nearby]
 
 
 def _shade(axes: Axes, spans: np.ndarray) -> None:

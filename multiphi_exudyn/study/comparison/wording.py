@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-__all__ = ["engineering", "listed", "percent", "seconds", "sentence", "share", "times"]
+__all__ = ["engineering", "faster", "listed", "percent", "seconds", "sentence", "share", "times"]
 
 
 def percent(value: float | None) -> str:
@@ -38,6 +38,11 @@ def times(value: float | None) -> str:
     if value is None or not math.isfinite(value):
         return "–"
     return f"{value:.0f} times" if value >= 10 else f"{value:.2g} times"
+
+
+def faster(ratio: float) -> str:
+    """A ratio of times: "12 times faster", "1.5 times slower"."""
+    return f"{times(ratio)} faster" if ratio >= 1 else f"{times(1 / ratio)} slower"
 
 
 def engineering(value: float) -> str:

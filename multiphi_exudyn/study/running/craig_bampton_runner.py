@@ -80,7 +80,7 @@ class CraigBamptonRunner(Runner):
         settings = CraigBamptonSettings(spec.step, spec.newton_tolerance, spec.spectral_radius, output_step=interval)
         t_end = self.setup.t_end
         answer = solve_craig_bampton(prepared.component, prepared.contacts, prepared.start, t_end, settings)
-        return answer, answer.wall_s
+        return answer, answer.cpu_s
 
     def outcome(self, prepared: Component, answer: CraigBamptonRun) -> dict[str, Any]:
         status = "failed" if answer.cause else "ok"

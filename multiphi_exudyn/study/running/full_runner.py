@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.levels.model.model import MultiPhiModel
+from multiphi_exudyn.mechanics.beam import beam_nodes
 from multiphi_exudyn.mechanics.structure import damping_matrix
 from multiphi_exudyn.study.running.runner import Runner
 from multiphi_exudyn.study.running.runs import interval_array
@@ -33,7 +34,14 @@ class FullRunner(Runner):
     def label(self) -> str:
         kind = "ANCF" if self.spec.beam == "ancf" else "geometrically exact"
         beam, each = ("beams", " each") if self.setup.mechanics.beam is None else ("beam", "")
-        return f"full Exudyn {beam}, {kind}, {self.spec.elements} elements{each}, step {self.spec.step * 1e6:g} µs"
+        return f"full Exudyn {beam}, {kind}, {self._elements()} elements{each}, step {self.spec.step * 1e6:g} µs"
+
+    def _elements(self) -> str:
+        """How many a beam has: more than asked for where points need nodes."""
+        beams = self.setup.mechanics.beams
+        assert beams is not None, "checked where the scene was loaded"
+        counts = [len(beam_nodes(beam, self.spec.elements)) - 1 for beam in beams.parts.values()]
+        return " to ".join(dict.fromkeys(f"{count}" for count in (min(counts), max(counts))))
 
     def prepare(self) -> tuple[FullBeam, dict[str, Any]]:
         beam = self.setup.full_beam(self.spec)

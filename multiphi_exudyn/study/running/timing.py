@@ -1,4 +1,4 @@
-"""Wall-clock times of a run, of its repeats, and of several runs in turns."""
+"""CPU times of a run, of its repeats, and of several runs in turns: waiting for other programs does not count."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ UNDISTURBED = 0.25  # share of the shortest times: a machine may be slow for thr
 
 
 def timed(run: Callable[[], T]) -> tuple[T, float]:
-    """Result of ``run``, and its wall-clock time [s]."""
-    started = time.perf_counter()
+    """Result of ``run``, and its CPU time [s]."""
+    started = time.process_time()
     result = run()
-    return result, time.perf_counter() - started
+    return result, time.process_time() - started
 
 
 def repeated(run: Callable[[], float], first: float, fewest: int) -> tuple[float, ...]:

@@ -20,7 +20,7 @@ from multiphi_exudyn.study.scene.parts import Mechanics
 if TYPE_CHECKING:
     from typing import Self
 
-__all__ = ["FullModel", "ModelSpec", "ReducedModel", "UserObjectModel"]
+__all__ = ["CraigBamptonModel", "FullModel", "ModelSpec", "ReducedModel", "UserObjectModel"]
 
 # (field, given value, needed value); a field that begins with a dot is one of the model's own table.
 Fault = tuple[str, object, str]
