@@ -32,6 +32,7 @@ STUDIES = {  # and what their values are
     "clamp-translation": "translation [N/m]",
     "support": "stiffness [N/m]",
     "amplitude": "pulled up [m]",
+    "clamp-play": "pulled up [m], clamp with play",
 }
 WINDOWS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0)  # s
 LOW_PASS = 15.0  # Hz: between the rate, at most 6.6 Hz, and the second mode, 37 Hz
@@ -48,9 +49,9 @@ def rates(time: np.ndarray, tip: np.ndarray) -> np.ndarray:
 
 
 def natural(setup: Setup) -> tuple[float, float]:
-    """First natural frequency [Hz] of the open level, and the limit of large motion."""
+    """First natural frequency [Hz] of the open level, and the limit of large motion, one contact closed in turn."""
     model = mp.MultiPhiModel(setup.structure, setup.mechanics.contacts, modes=2)
-    free, closed = (float(model.level(names).frequencies[0]) for names in ((), ("support",)))
+    free, closed = (float(model.level(names).frequencies[0]) for names in ((), (model.contacts[0].name,)))
     return free, 2 * free * closed / (free + closed)
 
 
@@ -72,8 +73,8 @@ def shown(name: str, quick: bool) -> dict[Any, tuple[float, float, np.ndarray]]:
 
 def draw(everything: dict[str, dict[Any, tuple[float, float, np.ndarray]]], path: str) -> None:
     """A panel for each study: the rise window by window, one line for each value of its axis."""
-    figure = matplotlib.figure.Figure(figsize=(9, 6.5), layout="constrained")
-    for axes, (name, found) in zip(figure.subplots(2, 2, sharey=True).flat, everything.items(), strict=False):
+    figure = matplotlib.figure.Figure(figsize=(9, 9.5), layout="constrained")
+    for axes, (name, found) in zip(figure.subplots(3, 2, sharey=True).flat, everything.items(), strict=False):
         for k, (value, (_, _, rise)) in enumerate(found.items()):
             shade = matplotlib.colormaps["viridis"](0.85 * k / max(1, len(found) - 1))
             label = value if isinstance(value, str) else f"{value:g}"

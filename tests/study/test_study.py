@@ -21,6 +21,7 @@ SHIPPED = (
     "amplitude",
     "budget",
     "clamp",
+    "clamp-play",
     "clamp-translation",
     "initial-displacement",
     "modes",
