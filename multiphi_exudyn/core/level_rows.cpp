@@ -59,6 +59,22 @@ double smallest_of(const Eigen::Ref<const Vector>& squares) {
     return std::isfinite(smallest) ? smallest : 1.0;
 }
 
+// Ratio of neighbouring omega^2 above which the lower mode is slow: it hardly bends what the others bend.
+constexpr double slow = 1e6;
+
+// The share (r,) of a link's length below which its gap in a mode is round-off.
+//
+// A slow mode rests f / omega^2 away: the springs that hardly bend in it carry a force of the others' order there. Its
+// gaps count in proportion to its omega^2, down to the round-off of a product.
+Vector negligible_gaps(const Vector& squares) {
+    Vector shares = Vector::Constant(squares.size(), round_off::zero);
+    for (Index j = squares.size() - 2; j >= 0; --j) {
+        const double above = squares[j + 1];
+        if (squares[j] > 0.0 && squares[j] * slow < above) shares.head(j + 1).array() *= squares[j] / above;
+    }
+    return shares.cwiseMax(round_off::product);
+}
+
 std::vector<int> links_at(const std::vector<int>& closed, const std::vector<int>& places) {
     std::vector<int> links;
     for (const int place : places) links.push_back(closed[place]);
@@ -105,9 +121,10 @@ LevelRows level_rows(const BaseRows& base, const std::vector<int>& closed, const
     OrthonormalBasis held;
     span(base.observed, base.sizes, links_at(closed, rigid), held);
     const std::vector<bool> holds = following(base.observed.topRows(links), lengths, held);
+    const Vector negligible = negligible_gaps(squares);
     for (Index i = 0; i < links; ++i) {
         for (Index j = 0; j < gaps.cols(); ++j) {
-            if (holds[i] || std::abs(gaps(i, j)) <= round_off::zero * lengths[i]) gaps(i, j) = 0.0;
+            if (holds[i] || std::abs(gaps(i, j)) <= negligible[j] * lengths[i]) gaps(i, j) = 0.0;
         }
     }
     const Index k = static_cast<Index>(closed.size());

@@ -37,6 +37,34 @@ def test_friction_beside_rigid_stops_sticks_as_on_a_free_structure(ground):
     assert_allclose(held.displacement(times), free.displacement(times), rtol=0, atol=1e-7)
 
 
+@pytest.mark.parametrize("ground", [1e-10, 3e-10, 1e-9, 1e-8])
+@pytest.mark.parametrize("speed", [-1.6, -1.1])
+@pytest.mark.filterwarnings("ignore:slow mode:multiphi_exudyn.MultiPhiWarning")
+def test_events_far_from_an_equilibrium_are_those_of_the_free_structure(ground, speed):
+    """It rests 0.1 N / 1e-10 N/m away: the slow mode carries the friction, and round-off of it closes no contact."""
+    stiffness = np.array([[4.7, -4.7, 0, 0], [-4.7, 10.1, -5.4, 0], [0, -5.4, 38.4, -33.0], [0, 0, -33.0, 33.0]])
+    contacts = [
+        mp.UnilateralContact("between", {"b": 1.0, "a": -1.0}, 0.25),
+        mp.Friction("rubs", {"b": 1.0, "d": -1.0}, 0.9, stiffness=1000.0),
+    ]
+
+    def run(ground):
+        held = stiffness + np.diag([ground, 0.0, 0.0, 0.0])
+        structure = mp.LinearStructure(
+            np.diag([1.1, 0.8, 1.75, 1.95]), held, points=dict(zip("abcd", range(4), strict=True))
+        )
+        loads = [mp.Gravity([1.0, -1.0, 1.0, -1.0], 1.0)]
+        return mp.simulate(
+            mp.MultiPhiModel(structure, contacts, modes="all"), 9.0, velocity=[-0.1, speed, -0.4, 0.0], loads=loads
+        )
+
+    slow, free = run(ground), run(0.0)
+    assert (slow.status, len(slow.events)) == ("ok", len(free.events))
+    assert len(free.events) > 50
+    times = np.linspace(0.0, 9.0, 50)
+    assert_allclose(slow.displacement(times), free.displacement(times), rtol=0, atol=1e-5)
+
+
 def slow_modes(run):
     return [text for text in run.warnings if text.startswith("slow mode: ")]
 
