@@ -24,8 +24,7 @@ import scipy.signal
 import multiphi_exudyn as mp
 from multiphi_exudyn.study.accuracy.cases import load_study
 from multiphi_exudyn.study.running.runners import run_model
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.workbench import Setup, prepare
+from multiphi_exudyn.study.setup import Setup, prepare
 
 STUDIES = {  # and what their values are
     "clamp": "rotation [N m/rad]",
@@ -61,7 +60,7 @@ def shown(name: str, quick: bool) -> dict[Any, tuple[float, float, np.ndarray]]:
     for at in study.points:
         case = study.reference(at)
         scene = study.scene_for(case)
-        setup = prepare(scene, mechanics_of(scene))
+        setup = prepare(scene)
         run = run_model(setup, study.model_name(case), progress=False)
         free, limit = natural(setup)
         (value,) = at.values()

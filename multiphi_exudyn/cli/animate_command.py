@@ -11,7 +11,7 @@ from multiphi_exudyn.cli.options import results_folder
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study.comparison.animation import gif, prepare_animation
-from multiphi_exudyn.study.scene.scenes import load_scene
+from multiphi_exudyn.study.scene import load_scene
 from multiphi_exudyn.time.model_warnings import grouped
 
 __all__ = ["run_animate"]

@@ -13,9 +13,8 @@ from multiphi_exudyn.study.accuracy.budget import budget
 from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
 from multiphi_exudyn.study.comparison.figure_style import png
 from multiphi_exudyn.study.comparison.wording import percent
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import load_scene
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.scene import load_scene
+from multiphi_exudyn.study.setup import prepare
 from multiphi_exudyn.time.model_warnings import grouped
 
 __all__ = ["run_budget"]
@@ -24,7 +23,7 @@ __all__ = ["run_budget"]
 def run_budget(source: str, t_end: float | None, modes: int | None, out: Path | None) -> bool:
     """Run all models of a scene's error budget and write budget.json and budget.png; return True if none failed."""
     scene = load_scene(source, t_end=t_end, modes=modes)
-    setup = prepare(scene, mechanics_of(scene))
+    setup = prepare(scene)
     folder = results_folder(out or Path(f"multiphi-{scene.name}"))
     values = budget(setup, scene.file.modes, progress=sys.stderr.isatty()).values()
     write_whole(folder / "budget.json", json.dumps(values, indent=1).encode())

@@ -20,9 +20,8 @@ from multiphi_exudyn.study.comparison.mode_shapes import level_modes
 from multiphi_exudyn.study.comparison.report import render
 from multiphi_exudyn.study.comparison.wording import percent, seconds, times
 from multiphi_exudyn.study.running.environment import environment, import_times
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import load_scene
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.scene import load_scene
+from multiphi_exudyn.study.setup import prepare
 
 __all__ = ["run_compare"]
 
@@ -30,7 +29,7 @@ __all__ = ["run_compare"]
 def run_compare(source: str, t_end: float | None, modes: int | None, out: Path | None) -> bool:
     """Run every model of a scene and write report.html, summary.json and histories.npz; return True if all ran."""
     scene = load_scene(source, t_end=t_end, modes=modes)
-    setup = prepare(scene, mechanics_of(scene))
+    setup = prepare(scene)
     folder = results_folder(out or Path(f"multiphi-{scene.name}"))
     with tqdm(total=len(scene.models) + 1, disable=None, unit="model") as bar:
 

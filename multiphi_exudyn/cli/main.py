@@ -173,7 +173,6 @@ def parser() -> argparse.ArgumentParser:
         "schema scene",
     )
     schema.add_argument("kind", choices=KINDS, help="of which file")
-    schema.add_argument("--markdown", action="store_true", help="all fields as a page to read instead (default: JSON)")
     add("scenes", _scenes, "list the shipped scenes, which compare, animate, budget and needs take", "", "scenes")
     add("studies", _studies, "list the shipped studies, which study takes", "", "studies")
     return top_parser
@@ -230,11 +229,11 @@ def _validate(options: argparse.Namespace) -> bool:
 def _schema(options: argparse.Namespace) -> bool:
     from multiphi_exudyn.cli.file_commands import run_schema
 
-    return run_schema(options.kind, options.markdown)
+    return run_schema(options.kind)
 
 
 def _scenes(options: argparse.Namespace) -> bool:
-    from multiphi_exudyn.study.scene.scenes import shipped_scenes
+    from multiphi_exudyn.study.scene import shipped_scenes
 
     return _print_titles(shipped_scenes())
 

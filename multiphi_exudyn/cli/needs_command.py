@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from tqdm import tqdm
 
 from multiphi_exudyn.study.running.needs import needs_of, needs_table
-from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
+from multiphi_exudyn.study.scene import load_scene, shipped_scenes
 from multiphi_exudyn.time.model_warnings import grouped
 
 __all__ = ["run_needs"]

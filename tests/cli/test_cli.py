@@ -15,9 +15,9 @@ from multiphi_exudyn import cli
 from multiphi_exudyn.cli import compare_command
 from multiphi_exudyn.cli.main import THREAD_SETTINGS, parser
 from multiphi_exudyn.files import write_whole
+from multiphi_exudyn.study import setup as bench
 from multiphi_exudyn.study.running import reduced_runner
-from multiphi_exudyn.study.scene import workbench
-from multiphi_exudyn.study.scene.scenes import shipped_scenes
+from multiphi_exudyn.study.scene import shipped_scenes
 
 FILES = {"report.html", "histories.npz", "summary.json"}
 
@@ -27,7 +27,7 @@ def scene(tmp_path, monkeypatch):
     """A small scene's file, in an empty working directory, without the seconds that import_times() takes."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(compare_command, "import_times", dict)
-    monkeypatch.setattr(workbench, "ELEMENTS", 16)
+    monkeypatch.setattr(bench, "ELEMENTS", 16)
     return write(tmp_path / "small.toml", BEAM)
 
 

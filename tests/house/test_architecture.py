@@ -143,7 +143,7 @@ BREACHES = {
     "itself": ("levels.level.level", "from multiphi_exudyn.levels.level.level import Level"),
     "its own room": ("levels.level.level", "import multiphi_exudyn.levels"),
     "the whole house": ("levels.level.level", "import multiphi_exudyn as mp"),
-    "a later room within one": ("study.scene.scenes", "from multiphi_exudyn.study.running import runs"),
+    "a later room within one": ("study.scene_tables", "from multiphi_exudyn.study.running import runs"),
     "what stands beside": ("time.simulate", "import reference_models.rig"),
     "for a type checker": ("levels.level.level", "if TYPE_CHECKING:\n    from multiphi_exudyn.levels import model"),
     "inside a function": ("levels.level.level", "def f():\n    from multiphi_exudyn.events import exits"),

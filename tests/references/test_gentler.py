@@ -11,9 +11,8 @@ from multiphi_exudyn.mechanics.beam import Clamp
 from multiphi_exudyn.study.comparison.compare import compare, summary
 from multiphi_exudyn.study.running import full_runner, runner, timing
 from multiphi_exudyn.study.running.runners import run_model
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import load_scene
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.scene import load_scene
+from multiphi_exudyn.study.setup import prepare
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.gentler import attempts, gentler
 from reference_models.rig import rig_beam
@@ -28,7 +27,7 @@ def bench_of(folder, stiffness, *models):
     data |= {"models": [*models, {"kind": "reduced", "name": "all", "modes": "all"}]}
     data |= {"comparison": {"reference": "all"}, "outputs": {"t_end": 0.12, "interval": 1e-3}}
     scene = load_scene(write(folder / "scene.toml", data))
-    return prepare(scene, mechanics_of(scene))
+    return prepare(scene)
 
 
 def test_each_rung_keeps_those_before_it():

@@ -7,9 +7,8 @@ import pytest
 from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.measures.stiff_stops import stiff_stops
 from multiphi_exudyn.study.running.runners import run_model
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import scene_data, scene_of
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.scene import scene_data, scene_of
+from multiphi_exudyn.study.setup import prepare
 
 MODELS = [
     {"kind": "reduced", "name": "linear", "modes": "all"},
@@ -24,7 +23,7 @@ def bench_of(stiffness, *models):
     data["outputs"] |= {"t_end": 0.3}
     data |= {"models": [*MODELS, *models], "comparison": {"reference": "linear"}}
     scene = scene_of(path, data)
-    return dataclasses.replace(prepare(scene, mechanics_of(scene)), repeats=0)
+    return dataclasses.replace(prepare(scene), repeats=0)
 
 
 def difference(run, reference, until):

@@ -21,9 +21,8 @@ from multiphi_exudyn.study.comparison.animation import (
     prepare_animation,
 )
 from multiphi_exudyn.study.running.runners import run_model
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import load_scene
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.scene import load_scene
+from multiphi_exudyn.study.setup import prepare
 
 pytestmark = pytest.mark.usefixtures("few_elements")
 
@@ -70,7 +69,7 @@ def drawn(path, frame, **chosen):
 def test_points_at_every_node_leave_both_models_as_they_are(scene):
     animated, runs, (axes, _) = drawn(scene, 7, slow=20.0)
     loaded = load_scene(scene)
-    setup = prepare(loaded, mechanics_of(loaded))
+    setup = prepare(loaded)
     for name, run in runs.items():
         alone = run_model(setup, name, progress=False)
         assert np.max(np.abs(run.points["tip"] - alone.points["tip"])) < SAME
@@ -84,7 +83,7 @@ def test_points_at_every_node_leave_both_models_as_they_are(scene):
 def test_the_shape_between_the_points_is_the_trajectory_of_the_linear_elements(tmp_path):
     animated, _, (axes, _) = drawn(write(tmp_path / "linear.toml", PLAIN), 4, slow=5.0)
     loaded = load_scene(str(tmp_path / "linear.toml"))
-    setup = prepare(loaded, mechanics_of(loaded))
+    setup = prepare(loaded)
     model = mp.MultiPhiModel(setup.structure, setup.mechanics.contacts)
     start = model.static_equilibrium({"tip": 1.0})
     trajectory = mp.simulate(model, 0.1, displacement=start * 0.01 / (setup.structure.row("tip") @ start))

@@ -9,9 +9,8 @@ from small_scene import BEAM, write
 import multiphi_exudyn as mp
 from multiphi_exudyn.mechanics.beam import Beam, Section, planar_beam
 from multiphi_exudyn.study.running.runners import run_model
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import load_scene
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.scene import load_scene, mechanics_of
+from multiphi_exudyn.study.setup import prepare
 from reference_models.beams import Beams
 from reference_models.full_beam import FullBeam, FullBeamSettings
 
@@ -112,7 +111,7 @@ class TestScenes:
     @pytest.mark.parametrize(("name", "t_end"), [("two-sided-stop", 0.03), ("clapping-cantilevers", 0.03)])
     def test_reduced_and_full_agree_through_the_first_contacts(self, name, t_end):
         scene = load_scene(name, t_end=t_end)
-        setup = prepare(scene, mechanics_of(scene))
+        setup = prepare(scene)
         first = next(name for name, spec in scene.models.items() if spec.kind == "reduced")
         reduced, full = (run_model(setup, name, progress=False) for name in (first, "full-cheapest"))
         assert sum(len(given) for given in full.contact_intervals.values()) >= 1
@@ -130,7 +129,7 @@ class TestScenes:
             start={"load_at": "a.tip", "measured_at": "b.tip", "displacement": 0.01},
             outputs={"t_end": 0.1, "points": ["a.tip"], "interval": 1e-3},
         )
-        setup = prepare(scene, mechanics_of(scene))
+        setup = prepare(scene)
         parts = {name: planar_beam(setup.mechanics.beams.parts[name], 57) for name in ("a", "b")}
         np.testing.assert_allclose(frequencies(setup.structure), frequencies(mp.assemble(parts, ties)), rtol=1e-9)
 

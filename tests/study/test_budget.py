@@ -14,9 +14,8 @@ from multiphi_exudyn.study.accuracy import budget as ladder
 from multiphi_exudyn.study.accuracy.budget import CAUSES, Rung, budget, decomposition
 from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import load_scene
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.scene import load_scene
+from multiphi_exudyn.study.setup import prepare
 
 pytestmark = pytest.mark.usefixtures("few_elements")
 
@@ -33,7 +32,7 @@ def bench_of(folder, **fields):
     data |= {"comparison": {"reference": "fine", "coarser": "coarse"}}
     data |= {"outputs": {"t_end": 0.05, "interval": 1e-4, "windows": [0.02]}} | fields
     scene = load_scene(write(folder / "scene.toml", data))
-    return prepare(scene, mechanics_of(scene))
+    return prepare(scene)
 
 
 @pytest.fixture(scope="module")
@@ -240,7 +239,7 @@ def test_bad_arguments_are_refused(small, refused, kind, begins, given):
 
 def test_levels_with_printed_frequencies_have_no_budget(refused):
     scene = load_scene("paper-rig-as-published", t_end=0.01)
-    refused(MultiPhiValueError, "scene", budget, prepare(scene, mechanics_of(scene)), 3)
+    refused(MultiPhiValueError, "scene", budget, prepare(scene), 3)
 
 
 def test_the_picture_has_a_panel_for_each_budget_and_is_drawn_from_values(small):

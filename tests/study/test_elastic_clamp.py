@@ -9,9 +9,8 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.mechanics.beam import Clamp, planar_beam
 from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.running.runners import run_model
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import load_scene
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.scene import load_scene, mechanics_of
+from multiphi_exudyn.study.setup import prepare
 from reference_models.exact_beam import exact_frequencies
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import assumptions, rig_beam, rig_contact
@@ -109,7 +108,7 @@ ONE_STEP = 1e-4  # of the full model's time step at this displacement, which lea
 
 def bench_of(folder, **structure):
     scene = load_scene(write(folder / "scene.toml", SCENE | {"structure": SCENE["structure"] | structure}))
-    return prepare(scene, mechanics_of(scene))
+    return prepare(scene)
 
 
 def test_all_models_of_a_scene_stand_on_its_clamp(tmp_path):

@@ -27,9 +27,8 @@ from multiphi_exudyn.study.comparison.pages import Picture
 from multiphi_exudyn.study.comparison.report import render
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import from_arrays, to_arrays
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import load_scene
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.scene import load_scene
+from multiphi_exudyn.study.setup import prepare
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
 from multiphi_exudyn.study.stability.report import text_table
 from multiphi_exudyn.time.model_warnings import grouped, issue, kept_back
@@ -62,7 +61,7 @@ def scene_file(tmp_path):
 
 def bench_of(scene_file):
     scene = load_scene(scene_file)
-    return prepare(scene, mechanics_of(scene))
+    return prepare(scene)
 
 
 def text_of(page):

@@ -12,9 +12,8 @@ from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.measures.measures import horizons, measures
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun, from_arrays, to_arrays
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import load_scene
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.scene import load_scene
+from multiphi_exudyn.study.setup import prepare
 
 KEYS = [
     "label", "kind", "dofs", "steps", "nrmse", "max_difference", "spectral_difference", "horizon", "largest",
@@ -28,7 +27,7 @@ RELATIVE = ("nrmse", "max_difference", "spectral_difference", "horizon")
 def setup(tmp_path_factory):
     outputs = {"t_end": 0.2, "points": ["middle", "tip"], "judged_points": ["tip"], "interval": 1e-4}
     scene = load_scene(write(tmp_path_factory.mktemp("scene") / "small.toml", changed(["outputs"], outputs)))
-    return prepare(scene, mechanics_of(scene))
+    return prepare(scene)
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from multiphi_exudyn import cli
 from multiphi_exudyn.study.running import needs as needs_module
 from multiphi_exudyn.study.running.needs import needs_of
 from multiphi_exudyn.study.running.run_alone import run_alone
-from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
+from multiphi_exudyn.study.scene import load_scene, shipped_scenes
 
 LEVELS = {
     "rubbing-stop": 4,

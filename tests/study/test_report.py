@@ -24,9 +24,8 @@ from multiphi_exudyn.study.comparison.report import contact_totals, render
 from multiphi_exudyn.study.comparison.wording import engineering, percent, seconds, times
 from multiphi_exudyn.study.measures.stiff_stops import StiffStops
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import load_scene
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.scene import load_scene
+from multiphi_exudyn.study.setup import prepare
 
 pytestmark = pytest.mark.usefixtures("few_elements")
 
@@ -50,7 +49,7 @@ ENVIRONMENT = {"python": "3", "versions": {"numpy": "2"}, "import_s": {"exudyn":
 def setup(tmp_path_factory):
     data = changed(["outputs", "points"], ["middle", "tip"]) | {"models": MODELS, "comparison": PARTS}
     scene = load_scene(write(tmp_path_factory.mktemp("scene") / "small.toml", data))
-    return prepare(scene, mechanics_of(scene))
+    return prepare(scene)
 
 
 @pytest.fixture(scope="module")
@@ -297,7 +296,7 @@ def test_a_scene_of_matrices_is_compared_without_shapes(tmp_path):
     data["start"] = {"load_at": "tip", "force": 1.0}
     data["outputs"]["t_end"] = 2.0
     scene = load_scene(write(tmp_path / "matrices.toml", changed(["models", 1, "modes"], 1, data)))
-    compared = compare(prepare(scene, mechanics_of(scene)), {}, progress=False)
+    compared = compare(prepare(scene), {}, progress=False)
     assert [run.status for run in compared.runs.values()] == ["ok", "ok"]
     assert compared.environment["load_average"] >= 0
     assert level_modes(compared) == ()
@@ -331,7 +330,7 @@ def test_modes_of_several_beams_are_of_the_levels_the_reference_held_longest(tmp
         "comparison": {"reference": "r24"},
     }
     scene = load_scene(write(tmp_path / "three.toml", data))
-    compared = compare(prepare(scene, mechanics_of(scene)), {}, progress=False)
+    compared = compare(prepare(scene), {}, progress=False)
     levels = level_modes(compared)
     assert levels[0].closed == ()
     assert sum(level.share for level in levels) == pytest.approx(1)
@@ -356,7 +355,7 @@ def test_many_contacts_are_told_of_together(tmp_path):
     data = changed(["structure", "beam"], beam) | {"contacts": rows}
     data = changed(["outputs"], {"t_end": 0.1, "points": ["tip"], "interval": 1e-3}, data)
     scene = load_scene(write(tmp_path / "bed.toml", data))
-    compared = compare(prepare(scene, mechanics_of(scene)), {}, progress=False)
+    compared = compare(prepare(scene), {}, progress=False)
     page = render(compared, level_modes(compared), loss_tables(compared.setup))
     assert page.count("data:image/png") == 1 + 1 + 1 + 1 + 1
     assert "meets 6 contacts from s1 to s6 (gap 1 mm, 10 kN/m each)" in text_of(page)

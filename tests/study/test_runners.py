@@ -17,9 +17,8 @@ from multiphi_exudyn.study.measures.metrics import nrmse
 from multiphi_exudyn.study.running import runner, timing
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.timing import in_turns, repeated, undisturbed
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import load_scene
-from multiphi_exudyn.study.scene.workbench import prepare, start_configuration
+from multiphi_exudyn.study.scene import load_scene
+from multiphi_exudyn.study.setup import prepare, start_configuration
 from reference_models.rig import rig_beam
 
 MODELS = [
@@ -42,7 +41,7 @@ def bench_of(folder, **fields):
     data = changed(["damping"], {"modal_ratios": [0.05], "beyond": 0.05}) | {"models": MODELS}
     data |= {"comparison": {"reference": "full"}, "outputs": {"t_end": 0.12, "interval": 1e-4}} | fields
     scene = load_scene(write(folder / "scene.toml", data))
-    return prepare(scene, mechanics_of(scene))
+    return prepare(scene)
 
 
 @pytest.fixture(scope="module")
@@ -225,7 +224,7 @@ def _first_order(structure, damping):
 def test_a_tolerance_in_place_of_a_number_of_modes(tmp_path):
     data = changed(["models", 1], {"kind": "reduced", "name": "to-1-percent", "tolerance": 0.01})
     scene = load_scene(write(tmp_path / "scene.toml", data))
-    setup = prepare(scene, mechanics_of(scene))
+    setup = prepare(scene)
     run = run_model(setup, "to-1-percent")
     assert run.label == "Multi-Phi, compliant levels, modes for a truncation error of 0.01"
     assert 2 <= run.dofs < setup.structure.n - 1

@@ -15,9 +15,8 @@ from multiphi_exudyn.study.comparison.compare import compare, histories, summary
 from multiphi_exudyn.study.comparison.plots import grey_spans, history_figure
 from multiphi_exudyn.study.comparison.report import render
 from multiphi_exudyn.study.running.runners import run_model
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import load_scene
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.scene import load_scene, mechanics_of
+from multiphi_exudyn.study.setup import prepare
 
 pytestmark = pytest.mark.usefixtures("few_elements")
 
@@ -41,7 +40,7 @@ SCENE = BEAM | {
 @pytest.fixture(scope="module")
 def setup(tmp_path_factory):
     scene = load_scene(write(tmp_path_factory.mktemp("scene") / "ring.toml", SCENE))
-    return prepare(scene, mechanics_of(scene))
+    return prepare(scene)
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +86,7 @@ def test_grey_is_where_it_sticks_if_there_are_no_contacts(compared):
 
 def test_the_user_object_of_a_stop_that_rubs_is_its_reduced_model():
     scene = load_scene("rubbing-stop")
-    setup = prepare(scene, mechanics_of(scene))
+    setup = prepare(scene)
     setup = dataclasses.replace(setup, time=setup.time[setup.time <= 0.25], repeats=1)
     names = "reduced-r12", "user-object-r12"
     reduced, body = (run_model(setup, name, progress=False) for name in names)
@@ -171,7 +170,7 @@ def test_the_limit_of_a_friction_is_an_axis_of_a_study(tmp_path):
 def test_a_stop_that_rubs_may_be_rigid():
     """In a scene's own words, and where a model takes all contacts rigid: along the stop, too."""
     scene = load_scene("rubbing-stop")
-    setup = prepare(scene, mechanics_of(scene))
+    setup = prepare(scene)
     (stop,) = setup.contacts(rigid=True)
     assert stop.stiffness == stop.tangential_stiffness == math.inf
     found = []

@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 from small_scene import BEAM, changed, write
 
 from multiphi_exudyn import MultiPhiValueError, RayleighDamping
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.model_kinds import FullModel
-from multiphi_exudyn.study.scene.scenes import load_scene, shipped_scenes
-from multiphi_exudyn.study.scene.structure_tables import RigStructure
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.model_kinds import FullModel
+from multiphi_exudyn.study.scene import load_scene, mechanics_of, shipped_scenes
+from multiphi_exudyn.study.scene_tables import RigStructure
+from multiphi_exudyn.study.setup import prepare
 from reference_models.rig import rig
 
 
@@ -105,6 +104,25 @@ def test_one_file_of_arrays_and_a_file_for_each_matrix_are_the_same_scene(tmp_pa
     np.testing.assert_array_equal(found[0].row("d"), found[1].row("d"))
 
 
+def test_a_scene_takes_nodes_supports_and_arrays_by_name_as_read_structure_does(tmp_path):
+    """One MATLAB file with names that tell what they are; another whose arrays are named; a table of nodes beside."""
+    stiffness = 4e4 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    scipy.io.savemat(tmp_path / "one.mat", {"M": np.eye(3), "K": stiffness})
+    scipy.io.savemat(tmp_path / "two.mat", {"A": stiffness, "B": np.eye(3)})
+    (tmp_path / "nodes.txt").write_text("1 3\n2 3\n3 3\n")
+    named = {"mass": ["two.mat", "B"], "stiffness": ["two.mat", "A"]}
+    by_node = {"points": {"middle": [2, 3], "tip": [3, 3]}, "dofs": "nodes.txt", "fixed": [[1, 3]]}
+    found = []
+    for table in (
+        by_node | {"matrices": "one.mat"},
+        {"matrices": named, "points": {"middle": 1, "tip": 2}, "fixed": [0]},
+    ):
+        found.append(mechanics_of(load_scene(write(tmp_path / "scene.toml", changed(["structure"], table)))).matrices)
+    for structure in found:
+        np.testing.assert_array_equal(structure.stiffness, stiffness[1:, 1:])
+        np.testing.assert_array_equal(structure.row("tip"), [0.0, 1.0])
+
+
 def test_sparse_matrices_are_refused_to_a_model_that_takes_dense_ones(tmp_path):
     for name in ("mass", "stiffness"):
         scipy.sparse.save_npz(tmp_path / f"{name}.npz", scipy.sparse.eye_array(2).tocsr())
@@ -183,7 +201,7 @@ BROKEN = {
     "unknown reference": (["comparison", "reference"], "full", "comparison.reference: got 'full', need one of"),
     "two of a name": (["models", 1, "name"], "all", "models[1].name: got 'all', need another name"),
     "too many samples": (["outputs", "interval"], 1e-12, "outputs.interval: got 1e-12, need at least"),
-    "no matrices": (["structure"], {"matrices": "no.npz", "points": {"tip": 0}}, "structure: matrices: got"),
+    "no matrices": (["structure"], {"matrices": "no.npz", "points": {"tip": 0}}, "structure: mass: got"),
     "no matrix": (["structure"], {"matrices": FILES, "points": {"tip": 0}}, "structure: mass: got"),
     "no stiffness": (["structure"], {"matrices": {"mass": "m.mtx"}, "points": {"tip": 0}}, "structure.matrices"),
     "unknown base": (["base"], "paper", "base: got 'paper', need one of: beam-chain"),
@@ -260,7 +278,7 @@ def prepared(tmp_path, data):
     file = write(tmp_path / "scene.toml", data)
     scene = load_scene(file)
     with pytest.raises(MultiPhiValueError) as caught:
-        prepare(scene, mechanics_of(scene))
+        prepare(scene)
     return str(caught.value).removeprefix(file + ": ")
 
 
@@ -281,7 +299,7 @@ def test_wrong_matrices_are_one_line(tmp_path, arrays):
 def test_a_broken_matrix_file_is_one_line(tmp_path, content):
     (tmp_path / "two.npz").write_bytes(content)
     data = changed(["structure"], {"matrices": "two.npz", "points": {"tip": 0}})
-    assert complaint(tmp_path, data).startswith("structure: matrices: got")
+    assert complaint(tmp_path, data).startswith("structure: mass: got")
 
 
 @pytest.mark.parametrize("source", ["", "no-such-scene", "no/such.toml", "paper-rig.toml", "../paper-rig", "\0"])

@@ -8,9 +8,8 @@ from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.study.measures import stiff_stops as module
 from multiphi_exudyn.study.measures.stiff_stops import rigid_models, stiff_stops
 from multiphi_exudyn.study.running.runners import run_model
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import load_scene
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.scene import load_scene
+from multiphi_exudyn.study.setup import prepare
 
 pytestmark = pytest.mark.usefixtures("few_elements")
 
@@ -20,7 +19,7 @@ RIGID = {"kind": "reduced", "name": "rigid", "contact": "rigid", "modes": "all"}
 def bench_of(tmp_path, *models, data=BEAM):
     data = data | {"models": [*BEAM["models"], *models]}
     scene = load_scene(write(tmp_path / "scene.toml", data))
-    return prepare(scene, mechanics_of(scene))
+    return prepare(scene)
 
 
 def one_mass(tmp_path, stiffness, mass=2.0):
@@ -36,7 +35,7 @@ def one_mass(tmp_path, stiffness, mass=2.0):
     }
     data["contacts"] = [BEAM["contacts"][0] | {"stiffness": stiffness}]
     scene = load_scene(write(tmp_path / "one.toml", data))
-    return prepare(scene, mechanics_of(scene))
+    return prepare(scene)
 
 
 @pytest.mark.parametrize(("own", "softest"), [("rigid", 1e8), (1e2, 1e8), (2e9, 1e10), (1e9, 1e9)])
@@ -71,7 +70,7 @@ def test_without_rigid_levels_nothing_is_run(tmp_path, monkeypatch):
 
 def test_levels_with_printed_frequencies_have_no_stiff_stop():
     scene = load_scene("paper-rig-as-published", t_end=0.01)
-    assert rigid_models(prepare(scene, mechanics_of(scene))) == ()
+    assert rigid_models(prepare(scene)) == ()
 
 
 def test_a_failure_is_told_and_measures_nothing(tmp_path, monkeypatch):

@@ -12,8 +12,7 @@ from multiphi_exudyn.study.accuracy.cases import CASE, load_study, shipped_studi
 from multiphi_exudyn.study.accuracy.study import run_study
 from multiphi_exudyn.study.running import runner, timing
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.workbench import prepare
+from multiphi_exudyn.study.setup import prepare
 from multiphi_exudyn.study.store import Store
 from multiphi_exudyn.study.sweep import open_executor
 
@@ -306,5 +305,5 @@ class TestRunning:
         assert set(pair.frequencies) == {"open", "stop closed"}
         study = load_study(study_file(data))
         scene = study.scene_for(study.runs({})[-1])
-        period = prepare(scene, mechanics_of(scene)).longest_period
+        period = prepare(scene).longest_period
         assert min(pair.frequencies["open"]) == pytest.approx(1 / period, rel=1e-9)

@@ -23,11 +23,11 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.study.model_kinds import FullModel, ModelSpec, ReducedModel, UserObjectModel
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.model_kinds import FullModel, ModelSpec, ReducedModel, UserObjectModel
-from multiphi_exudyn.study.scene.scene_file import DisplacedStart, LoadedStart
-from multiphi_exudyn.study.scene.workbench import Setup
+from multiphi_exudyn.study.scene_elements import DisplacedStart, LoadedStart
+from multiphi_exudyn.study.setup import Setup
 
 __all__ = ["CAUSES", "Budget", "Rung", "budget", "decomposition"]
 

@@ -27,11 +27,16 @@ from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.study.accuracy.study_file import COARSER, REFERENCE, MethodSpec, StudyFile, is_number
 from multiphi_exudyn.study.running.environment import machine
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.places import with_value
-from multiphi_exudyn.study.scene.scene_file import SceneFile
-from multiphi_exudyn.study.scene.scenes import Scene, scene_data, scene_of
-from multiphi_exudyn.study.scene.toml_file import read_toml, validated
+from multiphi_exudyn.study.scene import (
+    Scene,
+    SceneFile,
+    mechanics_of,
+    read_toml,
+    scene_data,
+    scene_of,
+    validated,
+    with_value,
+)
 from multiphi_exudyn.study.sweep import grid
 
 __all__ = ["BUDGET", "CASE", "TURNS", "Parameters", "Study", "load_study", "shipped_studies"]

@@ -30,8 +30,8 @@ from multiphi_exudyn.study.running.environment import environment, load_average
 from multiphi_exudyn.study.running.runners import ready_model, run_model
 from multiphi_exudyn.study.running.runs import ModelRun, from_arrays, to_arrays
 from multiphi_exudyn.study.running.timing import TURNS_BUDGET_S, in_turns
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.workbench import Setup, prepare
+from multiphi_exudyn.study.scene import mechanics_of
+from multiphi_exudyn.study.setup import Setup, prepare
 from multiphi_exudyn.study.store import Row, Store
 from multiphi_exudyn.study.sweep import Function, Outcome, sweep
 from multiphi_exudyn.time.model_warnings import kept_back
@@ -170,7 +170,7 @@ def _stiff(study: Study, cases: Sequence[Parameters], store: Store) -> StiffStop
 
 def _bench(study: Study, parameters: Mapping[str, Any]) -> Setup:
     scene = study.scene_for(parameters)
-    return prepare(scene, mechanics_of(scene))
+    return prepare(scene)
 
 
 def _window(study: Study, setup: Setup) -> float:

@@ -1,7 +1,7 @@
 """The format of a study file: a scene, what is varied in it, the methods to judge, and how.
 
 A *field* is a place in a scene file, written with dots ("start.displacement", "contacts.*.gap", "loads.0.frequency_hz";
-:mod:`multiphi_exudyn.study.scene.places`); its values may be whole tables. A *setting* is one choice of a method's
+:mod:`multiphi_exudyn.study.scene`); its values may be whole tables. A *setting* is one choice of a method's
 own fields (modes, elements, step ...); a method's settings are the Cartesian product of its axes. Where a setting can
 be lucky (micro-bounces are sampled differently by every step) it is run at *nearby* values too, and the worst counts.
 Errors of mesh and step can cancel for a whole range of steps, and few modes be right by chance: a setting *lasts* where
@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from multiphi_exudyn.study.scene.scene_file import Finite, Positive, Table
+from multiphi_exudyn.study.scene_tables import Finite, Positive, Table
 
 __all__ = ["COARSER", "REFERENCE", "BudgetSpec", "MethodSpec", "QuickSpec", "StudyFile", "is_number"]
 

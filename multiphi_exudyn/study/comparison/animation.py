@@ -31,9 +31,8 @@ from multiphi_exudyn.study.comparison.plots import grey_spans
 from multiphi_exudyn.study.comparison.wording import seconds
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.scenes import Scene
-from multiphi_exudyn.study.scene.workbench import Setup, mesh_nodes, prepare
+from multiphi_exudyn.study.scene import Scene, mechanics_of
+from multiphi_exudyn.study.setup import Setup, mesh_nodes, prepare
 
 __all__ = ["FRAME_RATE", "AnimatedScene", "gif", "moving_figure", "prepare_animation"]
 
@@ -91,7 +90,7 @@ def prepare_animation(
     beams = mechanics.beams
     if beams is None:
         raise MultiPhiValueError(f"{scene.path}: structure: got matrices, need beams, whose shapes are drawn along x")
-    mesh = mesh_nodes(scene, mechanics)
+    mesh = mesh_nodes(scene, beams)
     added = {name: {f"x = {place!r} m": place for place in x.tolist()} for name, x in mesh.items()}
     nodes = {name: (x, tuple(f"{name}.{node}" if name else node for node in added[name])) for name, x in mesh.items()}
     parts = {name: replace(beam, points={**beam.points, **added[name]}) for name, beam in beams.parts.items()}

@@ -17,11 +17,11 @@ import numpy as np
 
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.measures.stiff_stops import StiffStops, rigid_models, stiff_stops
+from multiphi_exudyn.study.model_kinds import CraigBamptonModel, ReducedModel, UserObjectModel
 from multiphi_exudyn.study.running.environment import load_average
 from multiphi_exudyn.study.running.runners import run_model
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.model_kinds import CraigBamptonModel, ReducedModel, UserObjectModel
-from multiphi_exudyn.study.scene.workbench import ROUND_OFF, Setup
+from multiphi_exudyn.study.setup import ROUND_OFF, Setup
 from multiphi_exudyn.study.store import plain
 
 __all__ = ["MOST_LISTED", "Comparison", "compare", "histories", "summary"]

@@ -16,8 +16,7 @@ from multiphi_exudyn.study.comparison.run_warnings import run_warnings
 from multiphi_exudyn.study.comparison.wording import engineering, listed
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.scene_loads import load_phrases
-from multiphi_exudyn.study.scene.workbench import Setup
+from multiphi_exudyn.study.setup import Setup
 
 __all__ = ["comparison_warnings", "findings"]
 
@@ -40,8 +39,8 @@ def findings(comparison: Comparison) -> dict[str, tuple[str, ...]]:
         setup=setup,
         until=comparison.headline_window,
         start=setup.scene.file.start,
-        loads=load_phrases(setup.scene.file.loads),
-        laws=[law.phrase() for law in setup.scene.file.force_laws],
+        loads=[f"the load {load.phrase()}" for load in setup.scene.file.loads],
+        laws=[f"the force law {law.phrase()}" for law in setup.scene.file.force_laws],
         contacts=_contact_phrases(setup.mechanics.contacts),
         headline=headline,
         best=None if best in headline else best,

@@ -14,8 +14,8 @@ import pandas as pd
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import interval_array
-from multiphi_exudyn.study.scene.scene_file import DisplacedStart
-from multiphi_exudyn.study.scene.workbench import Setup, start_configuration
+from multiphi_exudyn.study.scene_elements import DisplacedStart
+from multiphi_exudyn.study.setup import Setup, start_configuration
 from multiphi_exudyn.time.model_warnings import kept_back
 from multiphi_exudyn.time.simulate import simulate
 

@@ -16,8 +16,7 @@ from multiphi_exudyn.study.comparison.beam_places import beam_places, coefficien
 from multiphi_exudyn.study.comparison.compare import Comparison
 from multiphi_exudyn.study.comparison.figure_style import COLOURS, LINE, STYLE, WIDTH
 from multiphi_exudyn.study.measures.metrics import level_durations
-from multiphi_exudyn.study.scene.discretised import LinearBeams
-from multiphi_exudyn.study.scene.workbench import ELEMENTS
+from multiphi_exudyn.study.setup import ELEMENTS, LinearBeams
 from reference_models.beams import NAMELESS, Beams
 from reference_models.rig import PublishedLevel, published_frequencies
 

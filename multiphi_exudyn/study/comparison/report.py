@@ -17,7 +17,7 @@ from multiphi_exudyn.study.comparison.zoom import histories_to_zoom
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.measures.stiff_stops import StiffStops
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.workbench import ROUND_OFF
+from multiphi_exudyn.study.setup import ROUND_OFF
 from reference_models.rig import rig
 
 __all__ = ["contact_totals", "render"]

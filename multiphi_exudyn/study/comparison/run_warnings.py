@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from multiphi_exudyn.study.comparison.wording import share
-from multiphi_exudyn.study.scene.workbench import ROUND_OFF
+from multiphi_exudyn.study.setup import ROUND_OFF
 from multiphi_exudyn.time.model_warnings import grouped
 
 __all__ = ["run_warnings"]

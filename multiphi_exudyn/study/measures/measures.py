@@ -10,7 +10,7 @@ import numpy as np
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.measures.spectra import spectral_difference
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.workbench import Setup
+from multiphi_exudyn.study.setup import Setup
 
 __all__ = ["horizons", "measures"]
 

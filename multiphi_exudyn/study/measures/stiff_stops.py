@@ -26,7 +26,7 @@ from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.study.measures import metrics
 from multiphi_exudyn.study.running.runs import ModelRun
-from multiphi_exudyn.study.scene.workbench import Setup, start_configuration
+from multiphi_exudyn.study.setup import Setup, start_configuration
 from multiphi_exudyn.time.model_warnings import kept_back
 from multiphi_exudyn.time.simulate import simulate
 

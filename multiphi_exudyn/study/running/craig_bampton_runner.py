@@ -14,7 +14,7 @@ from scipy.interpolate import CubicHermiteSpline
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.study.running.runner import Runner
 from multiphi_exudyn.study.running.runs import interval_array
-from multiphi_exudyn.study.scene.workbench import start_configuration
+from multiphi_exudyn.study.setup import start_configuration
 from reference_models.craig_bampton import CraigBampton, craig_bampton
 from reference_models.craig_bampton_run import (
     CraigBamptonRun,

@@ -13,8 +13,8 @@ from multiphi_exudyn.mechanics.beam import beam_nodes
 from multiphi_exudyn.mechanics.structure import damping_matrix
 from multiphi_exudyn.study.running.runner import Runner
 from multiphi_exudyn.study.running.runs import interval_array
-from multiphi_exudyn.study.scene.scene_file import DisplacedStart
-from multiphi_exudyn.study.scene.workbench import start_configuration
+from multiphi_exudyn.study.scene_elements import DisplacedStart
+from multiphi_exudyn.study.setup import start_configuration
 from reference_models.full_beam import FullBeam, FullRun
 from reference_models.gentler import Attempt, attempts
 

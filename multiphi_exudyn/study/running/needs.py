@@ -18,10 +18,9 @@ from pathlib import Path
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.mechanics.structure import LinearStructure
-from multiphi_exudyn.study.scene.mechanics import mechanics_of
-from multiphi_exudyn.study.scene.model_kinds import ReducedModel
-from multiphi_exudyn.study.scene.scenes import Scene
-from multiphi_exudyn.study.scene.workbench import prepare, start_configuration
+from multiphi_exudyn.study.model_kinds import ReducedModel
+from multiphi_exudyn.study.scene import Scene
+from multiphi_exudyn.study.setup import prepare, start_configuration
 
 __all__ = ["Needs", "needs_of", "needs_table"]
 
@@ -56,7 +55,7 @@ def needs_of(scene: Scene) -> Needs:
     spec = next((s for s in scene.models.values() if isinstance(s, ReducedModel) and s.tolerance is None), None)
     if spec is None:
         raise MultiPhiValueError(f"{scene.path}: models: got none of kind 'reduced' with a number of modes, need one")
-    setup = prepare(scene, mechanics_of(scene))
+    setup = prepare(scene)
     model, structure = setup.model(spec), setup.structure
     model_arguments = {
         "structure": LinearStructure(structure.mass, structure.stiffness, structure.damping, structure.points),

@@ -17,7 +17,7 @@ from multiphi_exudyn.mechanics.structure import LinearStructure
 from multiphi_exudyn.study.running.runner import ENERGY_INTERVAL, Runner, modes_text
 from multiphi_exudyn.study.running.runs import interval_array
 from multiphi_exudyn.study.running.timing import timed
-from multiphi_exudyn.study.scene.workbench import start_equilibrium
+from multiphi_exudyn.study.setup import start_equilibrium
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.truncation import truncation_indicator

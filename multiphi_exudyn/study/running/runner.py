@@ -16,7 +16,7 @@ import numpy as np
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.running.timing import repeated, timed
-from multiphi_exudyn.study.scene.workbench import Setup, start_equilibrium
+from multiphi_exudyn.study.setup import Setup, start_equilibrium
 from reference_models.full_run import ENERGY_GAIN, EnergyBalance
 
 __all__ = ["ENERGY_INTERVAL", "Runner", "modes_text"]

@@ -1,6 +1,6 @@
 """Run one model of a scene; a failure gives a run with a cause, not an exception.
 
-Every kind of model (multiphi_exudyn.study.scene.model_kinds) has a runner.
+Every kind of model (multiphi_exudyn.study.model_kinds) has a runner.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from multiphi_exudyn.study.running.reduced_runner import GlobalBasisRunner, Redu
 from multiphi_exudyn.study.running.runner import Runner
 from multiphi_exudyn.study.running.runs import ModelRun
 from multiphi_exudyn.study.running.stepwise_runner import SplittingRunner, StepwiseRunner
-from multiphi_exudyn.study.scene.workbench import Setup
+from multiphi_exudyn.study.setup import Setup
 from multiphi_exudyn.time.model_warnings import kept_back
 
 __all__ = ["ready_model", "run_model"]

@@ -17,7 +17,7 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.study.running.runner import ENERGY_INTERVAL, Runner, modes_text
 from multiphi_exudyn.study.running.runs import interval_array
 from multiphi_exudyn.study.running.timing import timed
-from multiphi_exudyn.study.scene.workbench import start_configuration
+from multiphi_exudyn.study.setup import start_configuration
 from reference_models.splitting import Splitting, SplittingRun, splitting
 from reference_models.stepwise import StepwiseHistories, StepwiseRun, solve_stepwise
 

@@ -1,14 +1,16 @@
-"""Data shared by all models of a scene: M, C, K, contacts, force laws, friction, start and time grid.
+"""What all models of a scene share: M, C, K, contacts, force laws, friction, start and time grid.
 
-The structure is the linearisation of the reference's full beams, so a reduced model and its reference
-differ in nothing but the reduction, the geometric nonlinearity and the time integration.
+The structure is the linearisation of the reference's full beams, so a reduced model and its reference differ in nothing
+but the reduction, the geometric nonlinearity and the time integration. Scenes without a full model have beams of linear
+elements.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass, replace
+import time
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 import scipy.optimize
@@ -18,34 +20,43 @@ from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.level.level_override import LevelOverride
 from multiphi_exudyn.levels.model.mode_choice import Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mechanics.beam import beam_nodes
+from multiphi_exudyn.mechanics.assembly import Assembly, assemble
+from multiphi_exudyn.mechanics.beam import Beam, Clamp, beam_nodes, planar_beam
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.structure import LinearStructure
-from multiphi_exudyn.study.scene.discretised import Mesh, discretised
-from multiphi_exudyn.study.scene.fields import inside
-from multiphi_exudyn.study.scene.model_kinds import (
+from multiphi_exudyn.study.model_kinds import (
     CraigBamptonModel,
     FullModel,
     ReducedModel,
     StepwiseModel,
     UserObjectModel,
 )
-from multiphi_exudyn.study.scene.parts import Mechanics
-from multiphi_exudyn.study.scene.scene_file import DisplacedStart
-from multiphi_exudyn.study.scene.scene_loads import loads_of
-from multiphi_exudyn.study.scene.scenes import Scene, refuse
+from multiphi_exudyn.study.scene import Scene, loads_of, mechanics_of, refuse
+from multiphi_exudyn.study.scene_elements import DisplacedStart
+from multiphi_exudyn.study.scene_tables import Mechanics, inside
+from reference_models.beams import Beams
 from reference_models.craig_bampton import independent_points
 from reference_models.full_beam import FullBeam, FullBeamSettings
 from reference_models.rig import published_override
 
-__all__ = ["ELEMENTS", "ROUND_OFF", "Setup", "mesh_nodes", "prepare", "start_configuration", "start_equilibrium"]
+__all__ = [
+    "ELEMENTS",
+    "ROUND_OFF",
+    "LinearBeams",
+    "Setup",
+    "mesh_nodes",
+    "prepare",
+    "start_configuration",
+    "start_equilibrium",
+]
 
 START_TOLERANCE = 1e-13  # of the force, between the last two steps of its iteration
 START_ERROR = 1e-9  # of the prescribed displacement; the same as for full models
 REPEATS = 7
+KEPT = 32  # discretised beams, a few matrices of some 100 DoFs each: the runs of a study share them
 ROUND_OFF = 1 - 1e-9  # of the end of the run: a window that ends later is the whole run
 ELEMENTS = 57  # of a beam in a scene without a full model, as in the paper's model
 
@@ -125,7 +136,7 @@ class Setup:
     def loads(self) -> tuple[Load, ...]:
         """The scene's loads on its structure."""
         needed = self.mechanics.beams is not None and self.mechanics.needs_rigid_body_motion
-        return loads_of(self.scene, discretised(_mesh(self.scene, self.mechanics))[0].transverse if needed else None)
+        return loads_of(self.scene, _discretised(self.scene, self.mechanics)[0].transverse if needed else None)
 
     def loads_on(self, beam: FullBeam) -> tuple[Load, ...]:
         """The scene's loads on a full beam's own mesh."""
@@ -153,17 +164,21 @@ class Setup:
         return FullBeam(mechanics.beams, mechanics.contacts, settings, mechanics.force_laws, mechanics.frictions)
 
 
-def prepare(scene: Scene, mechanics: Mechanics) -> Setup:
-    """Build the data that the models of a scene share; raises MultiPhiValueError with file and field."""
+def prepare(scene: Scene, mechanics: Mechanics | None = None) -> Setup:
+    """Build what the models of a scene share; raises MultiPhiValueError with file and field.
+
+    mechanics: in place of what the scene describes, as with more points on its beams.
+    """
+    mechanics = mechanics_of(scene) if mechanics is None else mechanics
     structure, elapsed = mechanics.matrices, 0.0
     if structure is None:
-        beams, elapsed = discretised(_mesh(scene, mechanics))  # the same beams are linearised once for all scenes
+        beams, elapsed = _discretised(scene, mechanics)
         structure = beams.structure
     outputs = scene.file.outputs
     grid = outputs.interval * np.arange(round(outputs.t_end / outputs.interval) + 1)
     setup = Setup(scene, mechanics, replace(structure, damping=mechanics.damping), elapsed, grid)
     _check_modes(setup)
-    inside(f"{scene.path}: structure", lambda: setup.longest_period)  # raises an error for a structure without modes
+    inside(f"{scene.path}: structure", getattr, setup, "longest_period")  # an error for a structure without modes
     return setup
 
 
@@ -197,20 +212,62 @@ def start_equilibrium(setup: Setup, model: MultiPhiModel) -> Equilibrium:
     return model.equilibrium({start.load_at: root.root * free_force})
 
 
-def mesh_nodes(scene: Scene, mechanics: Mechanics) -> dict[str, np.ndarray]:
+class LinearBeams:
+    """Beams of linear elements. structure: M, K and points."""
+
+    def __init__(self, beams: Beams, elements: int) -> None:
+        self.beams = beams
+        self.elements = elements
+        parts = {name: planar_beam(beam, elements) for name, beam in beams.parts.items()}
+        self.structure = parts[""] if beams.only is not None else assemble(parts, beams.ties)
+
+    @functools.cached_property
+    def transverse(self) -> np.ndarray:
+        """e (n,), unit rigid-body motion along +z: M e is the inertia of the whole beams, see FullBeam.transverse."""
+        inertia = np.concatenate([_inertia(beam, self.elements) for beam in self.beams.parts.values()])
+        if isinstance(self.structure, Assembly):
+            inertia = self.structure.transformation.T @ inertia
+        return np.asarray(np.linalg.solve(self.structure.mass, inertia))
+
+
+def _inertia(beam: Beam, elements: int) -> np.ndarray:
+    """Inertia force (n,) on the free coordinates of a beam of linear elements under a unit acceleration."""
+    free = planar_beam(replace(beam, clamp=Clamp(0.0, 0.0)), elements)
+    inertia = free.mass[:, ::2].sum(axis=1)  # deflections and rotations alternate
+    springs = (beam.clamp.translation, beam.clamp.rotation)
+    return np.delete(inertia, [dof for dof, spring in enumerate(springs) if math.isinf(spring)])
+
+
+def mesh_nodes(scene: Scene, beams: Beams) -> dict[str, np.ndarray]:
     """Node positions (k,) [m] of every beam in the mesh of the scene's structure."""
-    assert mechanics.beams is not None, "the caller has checked it"
-    elements = _mesh(scene, mechanics).elements
-    return {name: beam_nodes(beam, elements) for name, beam in mechanics.beams.parts.items()}
+    return {name: beam_nodes(beam, _mesh(scene)[1]) for name, beam in beams.parts.items()}
 
 
-def _mesh(scene: Scene, mechanics: Mechanics) -> Mesh:
-    """The beams with kind and number of elements of the reference, or of another full model."""
+def _mesh(scene: Scene) -> tuple[str | None, int]:
+    """Kind of beam and number of elements of the reference, or of another full model; None: linear elements."""
     full = [model for model in scene.models.values() if model.kind == "full"]
     references = [model for model in full if model.name == scene.file.comparison.reference]
-    kind, elements = next(((model.beam, model.elements) for model in references or full), (None, ELEMENTS))
+    return next(((model.beam, model.elements) for model in references or full), (None, ELEMENTS))
+
+
+def _discretised(scene: Scene, mechanics: Mechanics) -> tuple[FullBeam | LinearBeams, float]:
+    """The beams without contacts, and the time of their first computation [s]; the same beams are computed once."""
     assert mechanics.beams is not None, "a structure is beams or matrices"
-    return Mesh.of(mechanics.beams, kind, elements)
+    key = (repr(asdict(mechanics.beams)), *_mesh(scene))
+    if key not in _computed:
+        if len(_computed) >= KEPT:
+            _computed.clear()
+        started = time.perf_counter()
+        _, kind, elements = key
+        if kind is None:
+            beams: FullBeam | LinearBeams = LinearBeams(mechanics.beams, elements)
+        else:
+            beams = FullBeam(mechanics.beams, (), FullBeamSettings(kind=kind, elements=elements))
+        _computed[key] = beams, time.perf_counter() - started
+    return _computed[key]
+
+
+_computed: dict[tuple[str, str | None, int], tuple[FullBeam | LinearBeams, float]] = {}
 
 
 def _check_modes(setup: Setup) -> None:
