@@ -14,13 +14,13 @@ Matrix rigid_directions(const Level& level) {
     const Base& base = level.model().base;
     std::vector<int> rigid;
     for (const int link : level.data().links)
-        if (std::isinf(base.stiffnesses[link])) rigid.push_back(link);
+        if (base.constrains(link)) rigid.push_back(link);
     return base.directions(rigid, Eigen::all);
 }
 
 Matrix shapes(const Level& level) {  // (Psi, R) (m, n)
     Matrix result(level.data().modes.rows(), level.width());
-    result << level.data().modes, level.data().channel_shapes;
+    result << level.data().shapes(), level.data().channel_shapes;
     return result;
 }
 

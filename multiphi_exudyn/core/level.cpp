@@ -155,7 +155,7 @@ Matrix Level::stretches() const {
 Matrix Level::motion_shapes() const {
     Matrix result(model_->base.modes(), width() + 1);
     if (is_base()) return result.setIdentity();
-    result << data_.modes, data_.channel_shapes, data_.configuration;
+    result << data_.shapes(), data_.channel_shapes, data_.configuration;
     return result;
 }
 
@@ -169,7 +169,7 @@ void Level::describe_potential() {
     potential_.linear.setZero(n);
     potential_.linear.head(r) = -data_.static_drive;
     if (base.general)  // constant forces of elements
-        potential_.linear.head(r) += data_.modes.transpose() * (data_.load - excitation_->static_load);
+        potential_.linear.head(r) += data_.shapes().transpose() * (data_.load - excitation_->static_load);
     potential_.rows.resize(q, n);
     if (q == 0) return;
     const Matrix shapes = motion_shapes().leftCols(n);
@@ -326,7 +326,7 @@ Vector Level::make_struck_defects() const {
     for (int i = 0; i < model_->size(); ++i)
         if (model_->elements[i].is_rigid()) contacts.push_back(i);
     for (const int link : data_.links)
-        if (!std::isfinite(base.stiffnesses[link])) held.push_back(link);
+        if (base.constrains(link)) held.push_back(link);
     if (contacts.empty()) return result;
     // An impulse along h moves the modes to Psi Psi^T h; Q keeps of it what is orthogonal to h and to what is closed.
     Matrix along = base.directions(contacts, Eigen::all), modes = data_.modes.transpose();
@@ -349,7 +349,7 @@ Vector Level::make_struck_defects() const {
 std::size_t Level::bytes() const {
     std::size_t total = sizeof(Level) + sizeof(int) * (data_.key.size() + data_.links.size() + first_guards_.size());
     for (const Matrix* part :
-         {&data_.damping_matrix, &data_.coupling, &data_.damping, &data_.modes, &data_.gap_rows, &data_.velocity_rows,
+         {&data_.damping_matrix, &data_.coupling, &data_.damping, &data_.modes, &data_.bending, &data_.gap_rows, &data_.velocity_rows,
           &data_.force_rows, &data_.force_velocity_rows, &data_.channel_force, &data_.channel_force_rate,
           &data_.channel_shapes, &data_.carried, &displacement_acceleration_, &velocity_acceleration_,
           &potential_.rows, &potential_.follows, &patterns_, &carried_, &response_sizes_[0], &response_sizes_[1],

@@ -79,7 +79,8 @@ struct LevelData {
     Vector computed;                         // the same as computed from M and K: those of `squares` may be given
     Matrix damping_matrix, coupling;         // D and S - diag(omega^2) (r, r), friction of sliding contacts included
     Matrix damping;                          // (r, r) of the structure and its links alone
-    Matrix modes;                            // Psi (m, r)
+    Matrix modes;                            // Psi (m, r), what has inertia of them
+    Matrix bending;                          // (m, r) what follows them without inertia (residual_boundary.hpp), or empty
     Vector configuration;                    // y_inf (m,), the asymptotic configuration
     Vector drive;                            // (r,) static load on zero-frequency modes,
     Vector static_drive;                     //   (r,) the same before a steady channel takes it over
@@ -95,6 +96,9 @@ struct LevelData {
     Matrix channel_shapes, carried;          // R (m, q); Y (m, q): the motion that rigid stops carry with them
     std::optional<Matrix> mobility;          // B = F F^T (r, r) that attached bodies leave to impacts
     double duration = std::numeric_limits<double>::infinity();  // longest motion in it [s]
+
+    // The motion (m, r) at unit eta: the modes, with what bends without inertia.
+    Matrix shapes() const { return bending.size() > 0 ? Matrix(modes + bending) : modes; }
 };
 
 // A constant force that others hold on the structure in a level: on its modes (s,), s >= r, and the direct reactions

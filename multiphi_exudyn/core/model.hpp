@@ -6,6 +6,8 @@
 // made, so that many runs may share it.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "element.hpp"
@@ -24,8 +26,13 @@ struct Base {
     double energy_offset = 0.0;     // [J] of the links at y = 0
     std::vector<int> held;          // links with a stick position, in their order
     std::vector<int> oblique;       // links whose force acts along another direction than their own
+    std::vector<int> residual;      // links that act through the flexibility of the modes left out (residual_boundary.hpp)
     bool general = false;           // some elements have stick positions or constant forces besides their links
 
+    // Whether a link that acts takes a direction from the motion: a rigid one does, but on a residual boundary.
+    bool constrains(int link) const {
+        return std::isinf(stiffnesses[link]) && std::find(residual.begin(), residual.end(), link) == residual.end();
+    }
     int modes() const { return static_cast<int>(squares.size()); }
     int links() const { return static_cast<int>(directions.rows()); }
 };

@@ -39,7 +39,7 @@ void add_channel_powers(const Level& level, const Vector& pushes, PowerForms& fo
     const std::vector<int>& links = data.links;
     const Matrix& carried = data.carried;
     Matrix shapes(base.modes(), n), moved(base.modes(), n);
-    shapes << data.modes, data.channel_shapes;
+    shapes << data.shapes(), data.channel_shapes;
     moved << data.modes, carried;
     const Vector static_load = excitation.static_load + base.preload;
     // work of unit forces of links on w'
@@ -59,7 +59,8 @@ void add_channel_powers(const Level& level, const Vector& pushes, PowerForms& fo
         if (std::isfinite(base.stiffnesses[link])) {
             forms.on_displacement += base.stiffnesses[link] * on_stops * data.gap_rows.row(link);
             forms.constant += base.stiffnesses[link] * data.gap_constants[link] * on_stops;
-        } else if (std::find(base.oblique.begin(), base.oblique.end(), link) != base.oblique.end()) {
+        } else if (!base.constrains(link) ||
+                   std::find(base.oblique.begin(), base.oblique.end(), link) != base.oblique.end()) {
             forms.on_displacement -= on_stops * data.force_rows.row(place);
             forms.on_velocity -= on_stops * data.force_velocity_rows.row(place);
             forms.constant -= data.forces[place] * on_stops;

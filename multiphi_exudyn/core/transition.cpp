@@ -20,7 +20,7 @@ constexpr double unmixed = 1e-13;
 // share that a stiff mode has in a soft one may count. The modes' own round-off, larger if there are many, is not
 // considered.
 Matrix modal_projection(const Level& target, const Level& source) {
-    Matrix products = target.data().modes.transpose() * source.data().modes;
+    Matrix products = target.data().modes.transpose() * source.data().shapes();
     for (Index i = 0; i < products.rows(); ++i) {
         for (Index j = 0; j < products.cols(); ++j) {
             const double own = std::abs(target.data().squares[i]), other = std::abs(source.data().squares[j]);
@@ -75,7 +75,7 @@ Matrix sizes_of_terms(const Level& source, const Level& target, const NewlyHeld&
     const LevelData& after = target.data();
     const int r = source.modes(), q = source.channels(), n = source.width();
     Matrix moved(before.modes.rows(), n + 1);
-    moved << before.modes.cwiseAbs(), before.channel_shapes.cwiseAbs() + after.channel_shapes.cwiseAbs(),
+    moved << before.shapes().cwiseAbs(), before.channel_shapes.cwiseAbs() + after.channel_shapes.cwiseAbs(),
         before.configuration.cwiseAbs() + after.configuration.cwiseAbs();
     Matrix set_by(q, n + 1);
     set_by << held.rows.cwiseAbs(), held.constants.cwiseAbs();

@@ -76,13 +76,13 @@ void Defects::add_start(const State& start, const State& after, const Instant& i
     if (model.is_complete) return;
     const LevelData& data = after.level->data();
     const bool holds_rigidly = std::any_of(data.links.begin(), data.links.end(),
-                                           [&](int link) { return std::isinf(model.base.stiffnesses[link]); });
+                                           [&](int link) { return model.base.constrains(link); });
     if (holds_rigidly || struck_at(instant) != Struck::none) {
         sum = nan;
         return;
     }
     const int m = model.base.modes(), r = after.level->modes(), q = after.level->channels();
-    const Vector d = start.displacement.head(m) - data.configuration - data.modes * after.displacement.head(r) -
+    const Vector d = start.displacement.head(m) - data.configuration - data.shapes() * after.displacement.head(r) -
                      data.channel_shapes * after.displacement.tail(q);
     const Vector w = start.velocity.head(m) - data.modes * after.velocity.head(r) -
                      data.channel_shapes * after.velocity.tail(q);

@@ -4,5 +4,5 @@ A structure is M, C, K and named points, given as matrices or by its modes, read
 assembled from others. Nothing is reduced or solved here.
 
 Order: arguments, dofs, damping, structure, assembly, condensed_structure, modal_structure, beam, element, contact,
-friction, force_law, element_table, time_functions, loads, files.
+residual_contact, friction, force_law, element_table, time_functions, loads, files.
 """

@@ -12,6 +12,7 @@ from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.mechanics.element import AnyLink, Element, is_oblique, link_indices, links_of
 from multiphi_exudyn.mechanics.force_law import ForceLaw
+from multiphi_exudyn.mechanics.residual_contact import ResidualContact
 
 __all__ = ["ElementTable"]
 
@@ -42,6 +43,16 @@ class ElementTable:
     def held(self) -> tuple[int, ...]:
         """Indices of the links with a stick position, which is a channel each."""
         return tuple(k for k, link in enumerate(self.links) if link.held)
+
+    @functools.cached_property
+    def residual(self) -> tuple[int, ...]:
+        """Indices of the links that act through the flexibility of the modes left out."""
+        return tuple(i for i, element in enumerate(self.contacts) if isinstance(element, ResidualContact))
+
+    @functools.cached_property
+    def rigid_links(self) -> np.ndarray:
+        """Whether a link (l,) that acts takes a direction from the motion."""
+        return np.array([link.rigid for link in self.links], bool)
 
     @functools.cached_property
     def laws(self) -> dict[int, ForceLaw]:

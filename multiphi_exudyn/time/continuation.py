@@ -41,7 +41,7 @@ def continued_start(trajectory: Trajectory, levels: LoadedLevels, rewound: bool 
     w, w_t = np.concatenate([prescribed, held]), np.concatenate([rates, np.zeros(len(held))])
     jump = _base_displacement(before, state.displacement[r:]) - _base_displacement(level, w)
     velocity_jump = _carried_velocity(before, state.velocity[r:]) - _carried_velocity(level, w_t)
-    vectors = level.level.vectors[:, :r]
+    vectors = level.modal.inertial
     xi = np.concatenate([state.displacement[:r] + vectors.T @ jump, w])
     xi_t = np.concatenate([state.velocity[:r] + vectors.T @ velocity_jump, w_t])
     _check_stops(level, stops_now, stops_before, _stop_slack(level) + _stop_slack(before))
@@ -65,7 +65,7 @@ def with_final_velocity(trajectory: Trajectory, velocity: np.ndarray) -> Traject
     state = trajectory.final
     assert state is not None, "a run that is ok has a final state"
     r = _mode_count(state.level)
-    vectors = state.level.level.vectors[:, :r]
+    vectors = state.level.modal.inertial
     modal_velocity = vectors.T @ (velocity - _carried_velocity(state.level, state.velocity[r:]))
     return trajectory.ending_in(replace(state, velocity=np.concatenate([modal_velocity, state.velocity[r:]])))
 

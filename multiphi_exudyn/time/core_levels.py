@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 import multiphi_exudyn._core as core
 from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
@@ -58,7 +60,8 @@ def level_data(level: LoadedLevel) -> core.LevelData:
         damping_matrix=modal.damping_matrix,
         coupling=modal.coupling,
         damping=modal.damping,
-        modes=modal.vectors,
+        modes=modal.inertial,
+        bending=np.zeros((0, 0)) if modal.bending is None else modal.bending,
         configuration=rest.configuration,
         drive=rest.drive,
         static_drive=level.alone.asymptotic.drive,

@@ -118,8 +118,10 @@ class Histories(Shown, ABC):
             self._evaluate(t, side, lambda segment, times: self._motion(segment.level, segment.modal(times, 2)))
         )
 
-    def at(self, point: At, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
+    def at(self, point: At, t: float | np.ndarray, side: str = "right", derivative: int = 0) -> float | np.ndarray:
         """Displacement [m] of a point (name, {point: coefficient} or row): a float for a scalar t, (k,) for (k,) times.
+
+        derivative: 1 for its velocity [m/s], 2 for its acceleration [m/s2].
 
         Examples
         --------
@@ -134,7 +136,17 @@ class Histories(Shown, ABC):
         >>> round(1e3 * tr.at("tip", 0.0), 3)  # mm
         7.5
         """
-        return self._values("at", point, t, side)
+        if derivative not in (0, 1, 2):
+            raise MultiPhiValueError(f"derivative: got {derivative!r}, need 0, 1 or 2")
+        if derivative == 0:
+            return self._values("at", point, t, side)
+        place = self._row("at", point)
+
+        def derived(segment: Segment, times: np.ndarray) -> np.ndarray:
+            row = place(segment.level)
+            return np.asarray(row[: len(row) // 2] @ segment.modal(times, derivative))
+
+        return self._evaluate(t, side, derived)
 
     def gap(self, contact: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """Gap [m] of a contact: a float for a scalar t, (k,) for (k,) times."""

@@ -505,6 +505,8 @@ def _power(level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray, xi_tt: np.ndarr
     stiffness = np.where(np.isinf(base.stiffnesses[index]), 0.0, base.stiffnesses[index])
     gaps = level.level.gap_rows[index] @ xi + level.gap_constants[index][:, None]
     springs = stiffness[:, None] * gaps + _dampers(level, xi_t)
+    residual = np.isin(index, base.residual)
+    springs[residual] = -(level.level.force_rows[residual] @ xi + level.asymptotic.forces[residual, None])
     power -= np.sum(springs * (level.excitation.stops[index] @ w_t), axis=0)
     power += level.pushes @ level.excitation.stops @ w_t
     for tension, _, surface in _following_friction(level, xi, xi_t):
@@ -512,9 +514,9 @@ def _power(level: LoadedLevel, xi: np.ndarray, xi_t: np.ndarray, xi_tt: np.ndarr
     if np.any(carried):
         y, velocity, acceleration = level.configuration(xi), level.motion(xi_t), level.motion(xi_tt)
         load = (level.excitation.static + base.preload + base.pushes @ level.pushes)[:, None] + varying
-        residual = acceleration + base.damping @ velocity + (base.modes.omega**2 * y.T).T - load
-        residual += base.pushes[:, index] @ (springs - _reactions(level, xi, xi_t))
-        power += np.sum((carried @ w_t) * residual, axis=0)
+        remainder = acceleration + base.damping @ velocity + (base.modes.omega**2 * y.T).T - load
+        remainder += base.pushes[:, index] @ (springs - _reactions(level, xi, xi_t))
+        power += np.sum((carried @ w_t) * remainder, axis=0)
     return np.asarray(power)
 
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -135,12 +135,24 @@ def first_start(
             y, v = [np.zeros(len(scales.times)) if each is None else base.coordinates(each) for each in (x, x_t)]
         else:
             y, v, far = projection.coordinates(x, x_t)
-    if far and scales.apart is not None:
+    if far and scales.apart is not None and not levels.model.residual:
         return Start(y, v, (), (), scales.stops, scales.apart, NO_PLACES)
     moving = v * scales.times
     length = math.sqrt(y.dot(y)) + math.sqrt(moving.dot(moving))
     gaps, near = y.dot(base.directions) + scales.stops, scales.near(np.abs(y) @ base.magnitudes[0], length)
-    return _in_touch(levels.model, scales, (y, v), (gaps.tolist(), near.tolist()), rest)
+    start = _in_touch(levels.model, scales, (y, v), (gaps.tolist(), near.tolist()), rest)
+    return _pressed(levels, start) if levels.model.residual else start
+
+
+def _pressed(levels: LoadedLevels, start: Start) -> Start:
+    """Start with those contacts on a residual boundary closed that press where the modes are as given."""
+    model, host = levels.model, levels.level(start.states)
+    jump, w = start.displacement - host.asymptotic.configuration, np.concatenate([levels.drive.values[0], start.held])
+    xi = np.concatenate([host.modal.inertial.T @ (jump - host.channels.shapes @ w), w])
+    gaps = host.level.gap_rows @ xi + host.gap_constants
+    pressed = model.residual_boundary(host.level.indices).pressed(gaps[list(model.residual)])
+    states = tuple(CLOSED if i in pressed else state for i, state in enumerate(start.states))
+    return replace(start, states=states, penetrating=tuple(sorted((*start.penetrating, *pressed))))
 
 
 def _in_touch(
@@ -161,6 +173,8 @@ def _in_touch(
                 f"displacement: lies {-gaps[i]:g} m inside the rigid contact {contact.name!r}, need a gap >= 0 "
                 "(static_equilibrium gives an admissible start)"
             )
+        if i in model.residual:
+            continue  # open in the host
         depth = 0.0 if abs(gaps[i]) <= near[i] else gaps[i]
         first_state = contact.first_state(depth, *rates[list(model.link_indices[i])].tolist())
         states[i] = [state.name for state in contact.states].index(first_state)

@@ -2,17 +2,20 @@
 #include <nanobind/eigen/dense.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <cmath>
 #include <optional>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "aligned_modes.hpp"
 #include "bindings/bindings.hpp"
 #include "level_rows.hpp"
+#include "residual_boundary.hpp"
 #include "secular_equation.hpp"
 
 namespace nb = nanobind;
@@ -68,6 +71,16 @@ LevelRows rows_of(const Given& observed, const GivenVector& sizes, const GivenVe
                       std::move(damped), std::move(gaps), std::move(damping));
 }
 
+std::tuple<Vector, Matrix, Matrix> on_residual(const Vector& squares, const Matrix& gaps, const Matrix& flexibility,
+                                               const Vector& compliances) {
+    const Index k = gaps.rows();
+    require(gaps.cols() == squares.size(), "gaps: need (k, r)");
+    require(flexibility.rows() == k && flexibility.cols() == k, "flexibility: need (k, k)");
+    require(compliances.size() == k, "compliances: need one of every contact");
+    ResidualModes modes = residual_modes(squares, gaps, flexibility, compliances);
+    return {std::move(modes.squares), std::move(modes.rotation), std::move(modes.forces)};
+}
+
 Eigen::Array<bool, Eigen::Dynamic, 1> following_of(const LevelRows& rows) {
     Eigen::Array<bool, Eigen::Dynamic, 1> result(static_cast<Index>(rows.following.size()));
     for (Index i = 0; i < result.size(); ++i) result[i] = rows.following[static_cast<std::size_t>(i)];
@@ -84,6 +97,9 @@ void bind_level_modes(nb::module_& module) {
     module.def("rank_one_modes", &rank_one, "d"_a, "p"_a, "stiffness"_a, "count"_a,
                "most_steps"_a = most_steps_of_a_root,
                "The lowest eigenvalues (count,) and vectors (count, m) of diag(d) + k p p^T; None if there are fewer.");
+    module.def("residual_modes", &on_residual, "squares"_a, "gaps"_a, "flexibility"_a, "compliances"_a,
+               "omega^2 (r,), their modes (r, r) in those of the host, and the forces (k, r) of contacts that act through "
+               "the flexibility of the modes left out.");
     nb::class_<LevelRows>(module, "LevelRows", "Gaps, damping and contact forces from the modes of a level.")
         .def_prop_ro("modes", [](const LevelRows& rows) { return rows.modes; })
         .def_prop_ro("damping", [](const LevelRows& rows) { return rows.damping; })

@@ -130,7 +130,8 @@ void bind_held_levels(nb::module_& module) {
 }
 
 void make_data(LevelData* self, Key key, std::vector<int> links, Vector squares, Vector computed,
-               Matrix damping_matrix, Matrix coupling, Matrix damping, Matrix modes, Vector configuration, Vector drive,
+               Matrix damping_matrix, Matrix coupling, Matrix damping, Matrix modes, Matrix bending,
+               Vector configuration, Vector drive,
                Vector static_drive, Vector load, double strain, double stored, Matrix gap_rows, Vector gap_constants,
                Matrix velocity_rows, Matrix force_rows, Matrix force_velocity_rows, Vector forces,
                Matrix channel_force, Matrix channel_force_rate, Matrix channel_shapes, Matrix carried,
@@ -139,6 +140,7 @@ void make_data(LevelData* self, Key key, std::vector<int> links, Vector squares,
                          std::move(squares),       std::move(computed),
                          std::move(damping_matrix), std::move(coupling),
                          std::move(damping),       std::move(modes),
+                         std::move(bending),
                          std::move(configuration), std::move(drive),
                          std::move(static_drive),  std::move(load),
                          strain,                   stored,
@@ -186,7 +188,8 @@ void bind_signals(nb::module_& module) {
 void bind_level(nb::module_& module) {
     nb::class_<LevelData>(module, "LevelData", "What levels/ computes of a level, in base coordinates and in xi.")
         .def("__init__", make_data, nb::kw_only(), "key"_a, "links"_a, "squares"_a, "computed"_a, "damping_matrix"_a,
-             "coupling"_a, "damping"_a, "modes"_a, "configuration"_a, "drive"_a, "static_drive"_a, "load"_a, "strain"_a,
+             "coupling"_a, "damping"_a, "modes"_a, "bending"_a, "configuration"_a, "drive"_a, "static_drive"_a, "load"_a,
+             "strain"_a,
              "stored"_a, "gap_rows"_a, "gap_constants"_a, "velocity_rows"_a, "force_rows"_a, "force_velocity_rows"_a,
              "forces"_a, "channel_force"_a, "channel_force_rate"_a, "channel_shapes"_a, "carried"_a,
              "mobility"_a = nb::none(), "duration"_a);

@@ -55,11 +55,11 @@ void make_element(Element* self, Kind kind, std::vector<int> links, std::vector<
 void make_model(Model* self, std::vector<Element> elements, Vector squares, Matrix damping, Matrix directions,
                 Matrix force_directions, Vector gaps, Vector stiffnesses, Vector dampings, Vector preload,
                 double energy_offset, std::vector<int> held, std::vector<int> oblique, bool general,
-                std::vector<int> roughest_first, bool is_complete, int knots) {
+                std::vector<int> residual, std::vector<int> roughest_first, bool is_complete, int knots) {
     new (self) Model{};
     self->base = Base{std::move(squares),     std::move(damping),  std::move(directions), std::move(force_directions),
                       std::move(gaps),        std::move(stiffnesses), std::move(dampings), std::move(preload),
-                      energy_offset,          std::move(held),     std::move(oblique),    general};
+                      energy_offset,          std::move(held),     std::move(oblique),    std::move(residual), general};
     self->elements = std::move(elements);
     self->roughest_first = std::move(roughest_first);
     self->is_complete = is_complete;
@@ -129,7 +129,7 @@ void bind_model(nb::module_& module) {
     nb::class_<Model>(module, "Model", "The coordinates that all levels share, and the elements.")
         .def("__init__", make_model, nb::kw_only(), "elements"_a, "squares"_a, "damping"_a, "directions"_a,
              "force_directions"_a, "gaps"_a, "stiffnesses"_a, "dampings"_a, "preload"_a, "energy_offset"_a, "held"_a,
-             "oblique"_a, "general"_a, "roughest_first"_a, "is_complete"_a, "knots"_a)
+             "oblique"_a, "general"_a, "residual"_a, "roughest_first"_a, "is_complete"_a, "knots"_a)
         .def_prop_ro("size", &Model::size)
         .def_prop_ro("modes", [](const Model& model) { return model.base.modes(); })
         .def_prop_ro("unit_directions", [](const Model& model) { return Matrix(model.unit_directions); })

@@ -21,8 +21,9 @@ import numpy as np
 
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.levels.level.level import Level
+from multiphi_exudyn.levels.level.quasi_static import quasi_static_response, static_responses
 from multiphi_exudyn.levels.level.sliding import SlidingLevel
-from multiphi_exudyn.mathematics.round_off import FOLLOWING, PRODUCT, ZERO, drop_round_off
+from multiphi_exudyn.mathematics.round_off import FOLLOWING, ZERO, drop_round_off
 
 __all__ = ["Channels"]
 
@@ -72,27 +73,28 @@ class Channels:
         static_level: its static response is that to constant channels.
         """
         base, index = level.base, list(level.indices)
-        rigid = np.isinf(base.stiffnesses[index])
+        rigid, residual = base.rigid_links[index], np.isin(index, base.residual)
         stops, directions = excitation.stops[index], base.directions[:, index]
-        springs = np.where(rigid, 0.0, base.stiffnesses[index])
-        pushed = directions @ (springs[:, None] * stops)
-        force = level.vectors.T @ (excitation.patterns + pushed)
-        loaded, forces_loaded = _quasi_static_parts(level, excitation.patterns)
+        springs = np.where(rigid | residual, 0.0, base.stiffnesses[index])
+        pushed = level.vectors.T @ (directions @ (springs[:, None] * stops))
+        pushed -= level.force_rows[residual].T @ stops[residual]
+        force = level.vectors.T @ excitation.patterns + pushed
+        loaded, forces_loaded = quasi_static_response(level, excitation.patterns)
         sizes = np.linalg.norm(excitation.patterns, axis=0) / np.linalg.norm(directions, axis=0)[:, None]
         forces_loaded = np.where(rigid[:, None], drop_round_off(forces_loaded, sizes), forces_loaded)
         unloaded = np.zeros_like(excitation.patterns)
-        moved, forces_moved = _static_responses(level, unloaded, -stops)
+        moved, forces_moved = static_responses(level, unloaded, -stops)
         if static_level is not level:
             constant = slice(excitation.prescribed, None)
-            part = _static_responses(static_level, unloaded[:, constant], -stops[:, constant])
+            part = static_responses(static_level, unloaded[:, constant], -stops[:, constant])
             moved[:, constant], forces_moved[:, constant] = part
-        carried, _ = _static_responses(level, unloaded, np.where(rigid[:, None], -stops, 0.0))
+        carried, _ = static_responses(level, unloaded, np.where(rigid[:, None], -stops, 0.0))
         centre = _centre(force, level.computed)
         loaded = drop_round_off(loaded, np.abs(level.vectors) @ np.abs(centre))  # zero if the level has all modes
-        sprung, soft = _centre(level.vectors.T @ pushed, level.computed), _is_small_difference(level)
+        sprung, soft = _centre(pushed, level.computed), _is_small_difference(level)
         if np.any(soft):
             sprung[soft] = (
-                level.vectors[:, soft].T @ _static_responses(level, unloaded, np.where(rigid[:, None], 0.0, -stops))[0]
+                level.vectors[:, soft].T @ static_responses(level, unloaded, np.where(rigid[:, None], 0.0, -stops))[0]
             )
         modal = centre - _centre(force, level.squares) - sprung
         constant = slice(excitation.prescribed, None)  # motion is centred on the whole static response to these,
@@ -107,8 +109,8 @@ class Channels:
             if derivative >= 0:
                 dampers = base.dampings[index] * (stops[:, k] - directions.T @ carried[:, k])  # forces at w' = 1
                 damped = base.damping @ carried[:, k] - directions @ dampers
-                force[:, derivative] -= level.vectors.T @ damped
-                rate[:, derivative] -= level.vectors.T @ carried[:, k]
+                force[:, derivative] -= level.inertial.T @ damped
+                rate[:, derivative] -= level.inertial.T @ carried[:, k]
                 contact_force[~rigid, derivative] += dampers[~rigid]
                 contact_force[rigid, derivative] += np.linalg.lstsq(pinned, damped, rcond=None)[0]
                 contact_rate[rigid, derivative] += np.linalg.lstsq(pinned, carried[:, k], rcond=None)[0]
@@ -126,7 +128,7 @@ class Channels:
         moved, slack = np.abs(stops), FOLLOWING / ZERO
         gap_columns = np.where(held, drop_round_off(gap_columns, slack * (sizes @ self.terms + moved)), gap_columns)
         speeds = np.where(held, drop_round_off(speeds, slack * (sizes @ np.abs(self.carried) + moved)), speeds)
-        closed = [i for i in level.indices if np.isinf(level.base.stiffnesses[i])]
+        closed = [i for i in level.indices if level.base.rigid_links[i]]
         fixed = held & ~np.any(stops[closed], axis=0)  # by contacts whose stops the channel does not move
         gap_columns, speeds = np.where(fixed, -stops, gap_columns), np.where(fixed, -stops, speeds)
         q = self.force.shape[1]
@@ -145,6 +147,7 @@ class Channels:
             neutral=level.neutral,
             computed=np.concatenate([level.computed, np.zeros(q)]),
             kept_beyond=level.kept_beyond,
+            bending=level.bending,
         )
 
 
@@ -167,26 +170,3 @@ def _is_small_difference(level: Level) -> np.ndarray:
     """
     sizes = level.base.stiffness_sizes(level.indices, level.vectors)
     return np.asarray((np.abs(level.computed) <= SMALL_DIFFERENCE * sizes) & (level.computed != 0))
-
-
-def _static_responses(level: Level, loads: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return static responses (m, q) and contact forces (k, q) to loads (m, q) and gaps (k, q) of closed contacts."""
-    configurations, forces = np.zeros_like(loads), np.zeros_like(gaps)
-    for k in np.flatnonzero(np.any(loads, axis=0) | np.any(gaps, axis=0)).tolist():
-        forces[:, k], configurations[:, k] = level.static_response(loads[:, k], gaps[:, k])
-    return configurations, forces
-
-
-def _quasi_static_parts(level: Level, patterns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return static responses (m, q) and contact forces (k, q) to loads, without the part in the level's modes.
-
-    (K_l^-1 - Psi omega^-2 Psi^T) b is computed as K_l^-1 (1 - Psi Psi^T) b: if a kept mode is soft, both terms of the
-    former are large. The remaining part in the modes is round-off, and is removed. A remainder that is round-off of the
-    products of a load with modes is zero: of weight on all modes of a free structure nothing remains.
-    """
-    psi = level.vectors
-    lengths = np.linalg.norm(patterns, axis=0)
-    remainder = drop_round_off(patterns - psi @ (psi.T @ patterns), PRODUCT / ZERO * lengths)
-    y, forces = _static_responses(level, remainder, np.zeros((len(level.indices), remainder.shape[1])))
-    part = psi.T @ y
-    return y - psi @ part, forces - level.force_rows @ part

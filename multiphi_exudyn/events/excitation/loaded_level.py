@@ -191,7 +191,7 @@ class LoadedLevel(Shown):
     def motion(self, velocity: np.ndarray) -> np.ndarray:
         """Return y' (m, ...) of xi', without the quasi-static part: Psi eta' + Y w'."""
         eta_t, w_t = self.split(velocity)
-        return np.asarray(self.modal.vectors @ eta_t + self.channels.carried @ w_t)
+        return np.asarray(self.modal.inertial @ eta_t + self.channels.carried @ w_t)
 
     def kinetic(self, velocity: np.ndarray) -> np.ndarray:
         """Return the kinetic energy [J] of xi' (r + q,), or of every column."""

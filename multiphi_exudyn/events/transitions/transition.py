@@ -50,7 +50,7 @@ class Transition:
         if not self.source.excitation.channels:
             return modal_projection(self.target.modal, self.source.modal)
         whole, (rows, _) = self._map(self.source.channels.shapes, self._shapes), self._set_channels
-        whole[: self._modes] -= self.target.modal.vectors.T @ self._shapes @ rows
+        whole[: self._modes] -= self.target.modal.inertial.T @ self._shapes @ rows
         whole[self._modes :] += rows
         return whole
 
@@ -66,9 +66,9 @@ class Transition:
         """c (r_m + q,)."""
         jump = self.source.asymptotic.configuration - self.target.asymptotic.configuration
         if not self.source.excitation.channels:
-            return np.asarray(self.target.modal.vectors.T @ jump)
+            return np.asarray(self.target.modal.inertial.T @ jump)
         _, constants = self._set_channels
-        return np.concatenate([self.target.modal.vectors.T @ (jump - self._shapes @ constants), constants])
+        return np.concatenate([self.target.modal.inertial.T @ (jump - self._shapes @ constants), constants])
 
     @property
     def _shapes(self) -> np.ndarray:
@@ -102,7 +102,7 @@ class Transition:
         target_level, source_level, q = self.target.modal, self.source.modal, source.shape[1]
         mapped = np.eye(target_level.modes + q, source_level.modes + q, source_level.modes - target_level.modes)
         mapped[: target_level.modes, : source_level.modes] = modal_projection(target_level, source_level)
-        mapped[: target_level.modes, source_level.modes :] = target_level.vectors.T @ (source - target)
+        mapped[: target_level.modes, source_level.modes :] = target_level.inertial.T @ (source - target)
         return mapped
 
     def displacement(self, xi: np.ndarray) -> np.ndarray:
@@ -122,7 +122,7 @@ def modal_projection(target: Level, source: Level) -> np.ndarray:
     share that a stiff mode has in a soft one may count. The modes' own round-off, larger if there are many, is not
     considered.
     """
-    products: np.ndarray = target.vectors.T @ source.vectors
+    products: np.ndarray = target.inertial.T @ source.vectors
     own, other = np.abs(target.squares)[:, None], np.abs(source.squares)
     share = np.sqrt(np.divide(other, own, out=np.ones(products.shape), where=own > other))
     products[np.abs(products) <= np.maximum(PRODUCT, UNMIXED * share)] = 0.0

@@ -64,6 +64,7 @@ def build_level(base: ModalBase, indices: tuple[int, ...], modes: int | None = N
         neutral=vectors[:, :0] if neutral is None else neutral,
         computed=squares,
         kept_beyond=0,
+        bending=None,
     )
 
 

@@ -64,7 +64,7 @@ class Level(Shown):
     squares : array (r,)
         omega^2 [rad2/s2], ascending, negative for growing modes.
     vectors : array (m, r)
-        Modes in base coordinates, orthonormal.
+        Modes in base coordinates, orthonormal but for a bending.
     damping : array (r, r)
         Phi_l^T C Phi_l [1/s].
     gap_rows : array (c, r)
@@ -81,6 +81,8 @@ class Level(Shown):
         omega^2 [rad2/s2] computed from M and K; ``squares`` differ where they are overridden.
     kept_beyond : int
         Number of modes beyond the requested ones, kept so that no cluster of modes of one frequency is cut.
+    bending : array (m, r) or None
+        The part of ``vectors`` without inertia, of contacts on a residual boundary; None for none.
 
     Examples
     --------
@@ -110,6 +112,7 @@ class Level(Shown):
     neutral: np.ndarray
     computed: np.ndarray
     kept_beyond: int
+    bending: np.ndarray | None
 
     def __getstate__(self) -> dict[str, Any]:
         return {key: value for key, value in vars(self).items() if key != "response"}  # of the core: a copy asks again
@@ -124,6 +127,11 @@ class Level(Shown):
     def modes(self) -> int:
         """Number of modes r."""
         return len(self.squares)
+
+    @functools.cached_property
+    def inertial(self) -> np.ndarray:
+        """The part (m, r) of the modes that has inertia, orthonormal: all of it without a bending."""
+        return self.vectors if self.bending is None else self.vectors - self.bending
 
     @functools.cached_property
     def vibrates(self) -> bool:
@@ -241,6 +249,7 @@ class Level(Shown):
             neutral=self.neutral,
             computed=self.computed[:modes],
             kept_beyond=modes - count,
+            bending=None if self.bending is None else self.bending[:, :modes],
         )
 
     def overridden(self, override: LevelOverride) -> Level:

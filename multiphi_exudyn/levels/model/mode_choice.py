@@ -160,8 +160,13 @@ def _count_for_points(base: ModalBase, rows: np.ndarray) -> int:
 
 
 def _single_closures(base: ModalBase) -> list[tuple[int, ...]]:
-    """Return active links of each level to check: the first link of a compliant element, a law's stiffest segment."""
-    single = [(i,) for i, element in enumerate(base.contacts) if i not in base.laws and not element.rigid]
+    """Return active links of each level to check: the first link of a compliant element, a law's stiffest segment.
+
+    A contact on a residual boundary has its whole flexibility with any number of modes.
+    """
+    single = [
+        (i,) for i, element in enumerate(base.contacts) if not (i in base.laws or i in base.residual or element.rigid)
+    ]
     return single + [links for links in (_stiffest(base, i) for i in base.laws) if links]
 
 

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.display import Shown, names
-from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiWarning
+from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, MultiPhiWarning
 from multiphi_exudyn.levels.base.stiffness_warnings import stiffness_warnings
 from multiphi_exudyn.levels.equilibrium.equilibrium_under_forces import equilibrium_under_forces
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.level.level_override import LevelOverride
+from multiphi_exudyn.levels.level.residual_level import ResidualBoundary
 from multiphi_exudyn.levels.level.sliding import with_sliding
 from multiphi_exudyn.levels.model.level_store import LevelStore
 from multiphi_exudyn.levels.model.mode_choice import Tolerance, UpTo
@@ -25,10 +26,12 @@ from multiphi_exudyn.levels.model.model_arguments import (
     check_modes,
     check_overrides,
     checked_contacts,
+    on_boundaries,
 )
 from multiphi_exudyn.levels.model.shared_base import SharedBase
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.element import Element
+from multiphi_exudyn.mechanics.residual_contact import ResidualContact
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["MultiPhiModel"]
@@ -65,6 +68,14 @@ class MultiPhiModel(SharedBase, Shown):
     validity : callable, default None
         Function of a trajectory of this model that returns sentences "kind: ..." on where the linear structure is not
         valid, none where it is; ``simulate`` calls it at the end of a run. None: no check.
+    boundary : "own", "residual", None, or mapping of contact name to one of these, default None
+        How contacts act in levels. "own": every level has its own modes, for which a closed contact is a spring or a
+        constraint. "residual": levels keep the modes of the level with these contacts open, and a closed contact acts
+        through the flexibility of the modes left out, 1/k + F. Then statics are exact for any number of modes, a rigid
+        contact is an elastic one of stiffness 1/F without impacts, and a level is an r x r change of one basis.
+        Contacts without friction, damping and restitution can be "residual". None: "residual" where a structure of
+        more than 600 degrees of freedom has 24 such contacts or more and its levels are truncated, else "own";
+        ``boundaries`` is what was chosen.
 
     Attributes
     ----------
@@ -99,6 +110,7 @@ class MultiPhiModel(SharedBase, Shown):
     modes: int | str | UpTo | Tolerance | None = None
     overrides: Mapping[tuple[str, ...], LevelOverride] = field(default_factory=dict)
     validity: Callable[[Any], Sequence[str]] | None = field(default=None, compare=False)
+    boundary: str | Mapping[str, str | None] | None = None
     _store: LevelStore | None = field(default=None, repr=False, compare=False)
     loaded: BoundedCache[Any, Any] = field(
         init=False, default_factory=lambda: BoundedCache(LOADS), repr=False, compare=False
@@ -114,7 +126,13 @@ class MultiPhiModel(SharedBase, Shown):
     def __post_init__(self) -> None:
         if not isinstance(self.structure, LinearStructure):
             raise MultiPhiTypeError(f"structure: got {type(self.structure).__name__}, need a LinearStructure")
-        object.__setattr__(self, "contacts", checked_contacts(self.contacts))
+        object.__setattr__(
+            self,
+            "contacts",
+            on_boundaries(checked_contacts(self.contacts), self.boundary, self.modes, self.structure.n),
+        )
+        if self.overrides and self.residual:
+            raise MultiPhiValueError("overrides: got some beside a residual boundary, need own modes at all contacts")
         check_directions(self.structure, self.links)
         check_modes(self.modes)
         check_overrides(self.overrides)
@@ -129,6 +147,11 @@ class MultiPhiModel(SharedBase, Shown):
         """Return the load (m,) of the constant forces of elements in these states."""
         pushes = [forces[state] for forces, state in zip(self.pushes_of_states, states, strict=True)]
         return np.asarray(self.base.directions[:, : len(pushes)] @ pushes)
+
+    @property
+    def boundaries(self) -> dict[str, str]:
+        """How every contact acts in levels, "own" or "residual", by name."""
+        return {c.name: "residual" if isinstance(c, ResidualContact) else "own" for c in self.contacts}
 
     @property
     def decided(self) -> MultiPhiModel | None:
@@ -226,10 +249,21 @@ class MultiPhiModel(SharedBase, Shown):
         cached = self._levels.find(indices)
         if cached is not None:
             return cached
+        closed = [i for i in indices if i in self.residual]
+        if closed:
+            host = tuple(i for i in indices if i not in self.residual)
+            return self._levels.keep(indices, self.residual_boundary(host).level(closed))
         level = self._untruncated(indices)
         level = level.truncated(self._mode_count(level))
         override = self.overrides.get(level.closed)
         return self._levels.keep(indices, with_sliding(level if override is None else level.overridden(override)))
+
+    def residual_boundary(self, indices: tuple[int, ...]) -> ResidualBoundary:
+        """Return the residual contacts beside the level of closed contacts given by ascending positions."""
+        boundary: ResidualBoundary = self.entries.get_or_build(
+            ("residual boundary", indices), lambda: ResidualBoundary.of(self.level_at(indices))
+        )
+        return boundary
 
     def _untruncated(self, indices: tuple[int, ...]) -> Level:
         """Return a level with at least the modes of this model, shared with models of other numbers of modes."""
