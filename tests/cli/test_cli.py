@@ -12,8 +12,7 @@ from small_scene import BEAM, changed, write
 
 import multiphi_exudyn as mp
 from multiphi_exudyn import cli
-from multiphi_exudyn.cli import compare_command
-from multiphi_exudyn.cli.main import THREAD_SETTINGS, parser
+from multiphi_exudyn.cli import THREAD_SETTINGS, parser
 from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.study import setup as bench
 from multiphi_exudyn.study.running import reduced_runner
@@ -26,7 +25,7 @@ FILES = {"report.html", "histories.npz", "summary.json"}
 def scene(tmp_path, monkeypatch):
     """A small scene's file, in an empty working directory, without the seconds that import_times() takes."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(compare_command, "import_times", dict)
+    monkeypatch.setattr("multiphi_exudyn.study.running.environment.import_times", dict)
     monkeypatch.setattr(bench, "ELEMENTS", 16)
     return write(tmp_path / "small.toml", BEAM)
 
@@ -92,7 +91,7 @@ def test_an_interrupted_comparison_leaves_no_file(scene, tmp_path, monkeypatch):
     def broken(comparison):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(compare_command, "summary", broken)
+    monkeypatch.setattr("multiphi_exudyn.study.comparison.compare.summary", broken)
     assert cli.main(["compare", scene]) == 130
     assert list((tmp_path / "multiphi-small").iterdir()) == []
 

@@ -34,7 +34,7 @@ HEAVY = {
 }
 CORE = "multiphi_exudyn._core"
 LATE = (  # load what they name when it is asked for: a command's own module, the public names
-    "multiphi_exudyn.cli.main",
+    "multiphi_exudyn.cli",
     "multiphi_exudyn",
 )
 

@@ -13,7 +13,7 @@ import pytest
 from small_scene import BEAM, changed, write
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.cli import compare_command
+from multiphi_exudyn import cli
 from multiphi_exudyn.study.comparison import figure_style, plots
 from multiphi_exudyn.study.comparison.compare import Comparison, compare, histories, summary
 from multiphi_exudyn.study.comparison.findings import findings
@@ -255,7 +255,7 @@ def test_a_busy_machine_is_told_with_its_load(comparison, capsys):
     alone, busy = (replace(comparison, environment={"cores": 4, "load_average": load}) for load in (3.9, 11.25))
     assert "Compare ratios" in findings(alone)["distrust"][-1]
     assert "the load average rose to 11 on 4 cores" in findings(busy)["distrust"][-1]
-    compare_command._print_summary(busy, Path())
+    cli._print_comparison(busy, Path())
     assert "the load average rose to 11 on 4 cores" in capsys.readouterr().out
 
 

@@ -9,7 +9,7 @@ import pytest
 from small_scene import BEAM, changed, write
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.cli.main import main
+from multiphi_exudyn.cli import main
 from multiphi_exudyn.study.accuracy.cases import load_study
 from multiphi_exudyn.study.comparison.compare import compare, histories, summary
 from multiphi_exudyn.study.comparison.plots import grey_spans, history_figure
