@@ -254,8 +254,9 @@ class _Lowest:
         forces = rows[np.any(rows, axis=1)].T
         if not forces.size:
             return
-        sizes = np.sqrt(np.einsum("ij,ij->j", forces, self.solve(forces)))  # each row's own flexibility becomes 1
-        block = self._response_beside(forces / sizes)
+        responses = self.solve(forces)
+        sizes = np.sqrt(np.einsum("ij,ij->j", forces, responses))  # each row's own flexibility becomes 1
+        block = self._beside(responses / sizes, forces / sizes)
         vectors = np.zeros((len(forces), 0)), np.zeros((len(forces), 0))
         for _ in range(DEEPEST):
             block = orthonormal_complement(block, vectors)
@@ -263,14 +264,15 @@ class _Lowest:
                 return
             vectors = np.hstack([vectors[0], block[0]]), np.hstack([vectors[1], block[1]])
             yield vectors
-            shapes, forces = self._response_beside(self.mass @ block[0])
+            forces = self.mass @ block[0]
+            shapes, forces = self._beside(self.solve(forces), forces)
             sizes = np.sqrt(np.einsum("ij,ij->j", shapes, forces))
             block = shapes / sizes, forces / sizes
 
-    def _response_beside(self, forces: np.ndarray) -> Vectors:
-        """Return the parts of A^-1 F and of F beside V, orthogonal to V in M and in K."""
-        shapes, components = self.solve(forces), self.vectors.T @ forces
-        shapes -= self.vectors @ (components / (self.values + self.shift)[:, None])
+    def _beside(self, responses: np.ndarray, forces: np.ndarray) -> Vectors:
+        """Return the parts of A^-1 F and of F (n, k) beside V, orthogonal to V in M and in K."""
+        components = self.vectors.T @ forces
+        shapes = responses - self.vectors @ (components / (self.values + self.shift)[:, None])
         shapes -= self.vectors @ (self.vectors.T @ (self.mass @ shapes))
         return shapes, forces - self.mass @ (self.vectors @ components)
 

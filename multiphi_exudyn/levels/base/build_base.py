@@ -19,6 +19,7 @@ from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.element import AnyLink, Element, Link, link_indices, links_of
+from multiphi_exudyn.mechanics.residual_contact import ResidualContact
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
 __all__ = ["COMPLETE", "build_base"]
@@ -51,10 +52,11 @@ def build_base(
         first = np.array(parallel(rows.T), int)
         distinct = np.unique(first)
         stiffness = np.array([_largest_stiffness(contacts, np.flatnonzero(first == index)) for index in distinct])
-        krylov_rows = np.vstack([rows[distinct], points, load_rows])
-        lowest = _incomplete_base_modes(
-            structure, krylov_rows, _sample_levels(stiffness, int(modes)), int(modes), previous
-        )
+        shown = np.vstack([rows[distinct], points, load_rows])
+        krylov_rows = shown[sorted(set(parallel(shown.T)))]  # the distinct rows of contacts come first
+        own = [place for place, link in enumerate(distinct.tolist()) if not isinstance(links[link], ResidualContact)]
+        samples = _sample_levels(own, stiffness, int(modes))
+        lowest = _incomplete_base_modes(structure, krylov_rows, samples, int(modes), previous)
     aligned = lowest.modes.aligned(points)
     return ModalBase(
         modes=aligned,
@@ -81,12 +83,15 @@ def _incomplete_base_modes(
     return lowest_modes(structure.mass, structure.stiffness, count, rows, samples, known_modes, least=min(modes, count))
 
 
-def _sample_levels(stiffness: np.ndarray, modes: int) -> list[HeldRows]:
-    """Return the levels on which a base is judged: one row alone, and ``modes`` rows spread over all of them."""
-    count = len(stiffness)
-    single = [[k] for k in sorted({0, count // 2, count - 1})] if count else []
-    together = np.unique(np.linspace(0, count - 1, min(count, modes)).astype(int)).tolist()
-    row_sets = [*single, together] if count > 1 else single
+def _sample_levels(own: Sequence[int], stiffness: np.ndarray, modes: int) -> list[HeldRows]:
+    """Return the levels on which a base is judged: one row alone, and ``modes`` rows spread over all of them.
+
+    own: the rows of contacts with own modes; of those on a residual boundary the static response is all that counts.
+    """
+    count = len(own)
+    single = [[own[k]] for k in sorted({0, count // 2, count - 1})] if count else []
+    spread = np.unique(np.linspace(0, count - 1, min(count, modes)).astype(int)).tolist() if count else []
+    row_sets = [*single, [own[k] for k in spread]] if count > 1 else single
     return [HeldRows(rows, stiffness[rows], modes) for rows in row_sets]
 
 

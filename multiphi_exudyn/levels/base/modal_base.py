@@ -19,6 +19,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse
 
 from multiphi_exudyn._core import are_independent
 from multiphi_exudyn.display import Shown, names
@@ -33,6 +34,7 @@ from multiphi_exudyn.mechanics.element_table import ElementTable
 __all__ = ["ModalBase", "parallel"]
 
 PARALLEL = 1e-14  # of the largest component: directions that differ by less differ by round-off
+NEARLY_PARALLEL = 1 - 1e-6  # cosine of two directions that are compared closely
 INTERLACING = 1e-8  # relative violation of the interlacing theorem that is still round-off
 EPSILON = float(np.finfo(float).eps)
 CLOSED_SETS = 8  # of contacts, whose directions are cached: a level needs them when it is built and when it is loaded
@@ -290,11 +292,15 @@ class ModalBase(ElementTable, Shown):
 
 def parallel(directions: np.ndarray) -> list[int]:
     """Return for every column of (m, l) the index of the first column that is equal up to its sign."""
-    first, distinct = list[int](), list[int]()
+    lengths = np.linalg.norm(directions, axis=0)
+    units = scipy.sparse.csc_array(directions / np.where(lengths > 0, lengths, 1.0))
+    alike = scipy.sparse.csc_array(abs(units.T @ units) > NEARLY_PARALLEL)
+    alike_columns = np.split(alike.indices, alike.indptr[1:-1])
+    zeros, first = np.flatnonzero(lengths == 0), list(range(directions.shape[1]))
     for i, column in enumerate(directions.T):
-        others = directions[:, distinct]
-        distances = [np.max(np.abs(column[:, None] - sign * others), axis=0) for sign in (1, -1)]
-        same = np.flatnonzero(np.minimum(*distances) <= PARALLEL * np.max(np.abs(others), axis=0))
-        first.append(distinct[same[0]] if len(same) else i)
-        distinct += [] if len(same) else [i]
+        others = np.array([j for j in (alike_columns[i] if lengths[i] else zeros) if j < i and first[j] == j], int)
+        distances = [np.max(np.abs(column[:, None] - sign * directions[:, others]), axis=0) for sign in (1, -1)]
+        same = others[np.minimum(*distances) <= PARALLEL * np.max(np.abs(directions[:, others]), axis=0)]
+        if len(same):
+            first[i] = int(np.min(same))
     return first

@@ -174,9 +174,12 @@ class Level(Shown):
         """For every closed compliant contact, the part of its flexibility h.K_l^-1 h that the truncated modes have.
 
         rho = truncated / (truncated + sum |h.psi / omega|^2 over kept modes), 0 to 1, by name; for a force law by the
-        law's name. A contact beside a closed rigid contact of the same direction cannot move and is not listed.
+        law's name. A contact beside a closed rigid contact of the same direction cannot move and is not listed; on a
+        residual boundary none is, as they have all of it.
         """
         base = self.base
+        if self.bending is not None:
+            return {}
         closed_directions = base.closed_at(self.indices).orthogonal
         springs, flexibilities = np.flatnonzero(~closed_directions.rigid), self._flexibilities(closed_directions)
         names = [base.labels[closed_directions.members[s][0]] for s in springs.tolist()]

@@ -30,14 +30,15 @@ __all__ = ["ResidualBoundary"]
 class ResidualBoundary:
     """The residual contacts of a host, with what their forces bend beside its modes.
 
-    links: (c,). shapes: (m, c). forces_of_host: (k, c), of the links that act in the host. flexibility: F (c, c).
-    compliances: 1/k (c,), zero where rigid.
+    links: (c,). shapes: (m, c). forces_of_host: (k, c), of the links that act in the host. gaps: of all links (l, c).
+    flexibility: F (c, c), those of these contacts. compliances: 1/k (c,), zero where rigid.
     """
 
     host: Level
     links: tuple[int, ...]
     shapes: np.ndarray
     forces_of_host: np.ndarray
+    gaps: np.ndarray
     flexibility: np.ndarray
     compliances: np.ndarray
 
@@ -47,7 +48,8 @@ class ResidualBoundary:
         base, links = host.base, host.base.residual
         directions = base.directions[:, list(links)]
         shapes, forces = quasi_static_response(host, directions)
-        flexibility, compliances = directions.T @ shapes, 1 / base.stiffnesses[list(links)]
+        gaps, compliances = base.directions.T @ shapes, 1 / base.stiffnesses[list(links)]
+        flexibility = gaps[list(links)]
         whole = np.sum((directions * base.periods[:, None]) ** 2, axis=0)
         for place, link in enumerate(links):
             if compliances[place] == 0 and flexibility[place, place] <= INDEPENDENT * whole[place]:
@@ -55,7 +57,7 @@ class ResidualBoundary:
                     f"boundary of {base.links[link].name!r}: got 'residual' for a rigid contact where all modes are "
                     "kept, need 'own' or fewer modes"
                 )
-        return cls(host, links, shapes, forces, (flexibility + flexibility.T) / 2, compliances)
+        return cls(host, links, shapes, forces, gaps, (flexibility + flexibility.T) / 2, compliances)
 
     def level(self, closed: Sequence[int]) -> Level:
         """Return the level in which these links act besides those of the host."""
@@ -67,7 +69,7 @@ class ResidualBoundary:
             host.squares, directions.T @ host.vectors, flexibility, compliances
         )
         bending = shapes @ forces
-        gap_rows = host.gap_rows @ rotation + base.directions.T @ bending
+        gap_rows = host.gap_rows @ rotation + self.gaps[:, places] @ forces
         gap_rows[acting] = -compliances[:, None] * forces  # no difference of large terms
         both = [*host.indices, *acting]
         force_rows = np.vstack([host.force_rows @ rotation + self.forces_of_host[:, places] @ forces, forces])
