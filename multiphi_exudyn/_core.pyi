@@ -485,13 +485,6 @@ class SmallProblem:
     @property
     def excluding(self) -> list[int]: ...
 
-class StartProjection:
-    """Whether a start touches nothing."""
-
-    def __init__(self, sizes: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], times: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], units: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], bounds: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], near: float) -> None: ...
-
-    def is_far(self, vectors: Annotated[NDArray[numpy.float64], dict(shape=(4, None), order='C', device='cpu')]) -> bool: ...
-
 CUBIC_REMAINDER: float = 0.0026041666666666665
 
 class SearchOutcome(enum.Enum):
@@ -875,11 +868,6 @@ class BatchRun:
 
 def run_batch(levels: Levels, starts: Sequence[Start], window: int, allowed: float, time: float, end: float, threads: int) -> list[BatchRun]:
     """Runs from many starts on several threads."""
-
-def sample_batch(levels: Levels, trajectories: Sequence[Trajectory], rows: Mapping[Sequence[int], Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]], times: Sequence[float], threads: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]:
-    """
-    Displacements (runs, points, times) of points; rows: of (xi, xi', 1) of all points, by the levels' keys.
-    """
 
 class Sampler:
     """Values of a recorded motion at any times."""

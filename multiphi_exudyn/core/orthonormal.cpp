@@ -47,19 +47,6 @@ void add_multiple(double* vector, double factor, const double* other, int m) {
     for (int i = 0; i < m; ++i) vector[i] += factor * other[i];
 }
 
-void clear_products(double* products, const double* given, const double* matrix, const double* row_sums, int n) {
-    double largest = 0.0;
-    for (int j = 0; j < n; ++j) largest = std::max(largest, std::abs(given[j]));
-    if (!(largest > 0.0)) return;
-    for (int i = 0; i < n; ++i) {
-        const double size = std::abs(products[i]);
-        if (size <= round_off::clear * (row_sums[i] * largest)) {
-            const double* row = matrix + static_cast<std::ptrdiff_t>(i) * n;
-            if (size <= round_off::zero * absolute_product(row, given, n)) products[i] = 0.0;
-        }
-    }
-}
-
 void remove_direction(const double* direction, double* vectors, int m, int count) {
     const double square = scalar_product(direction, direction, m);
     if (!(square > 0.0)) return;

@@ -24,11 +24,6 @@ double absolute_product(const double* a, const double* b, int m);
 // Adds a multiple of another vector to a vector.
 void add_multiple(double* vector, double factor, const double* other, int m);
 
-// Sets products A x (n,) to zero where they are round-off of their terms |A| |x|. `matrix` is |A| (n, n), row by row.
-// The terms are at most `row_sums` (n,) of |A| times the largest |x|; they are added up only where this bound does not
-// decide.
-void clear_products(double* products, const double* given, const double* matrix, const double* row_sums, int n);
-
 // Removes a direction of any length from `count` vectors that follow each other.
 void remove_direction(const double* direction, double* vectors, int m, int count = 1);
 

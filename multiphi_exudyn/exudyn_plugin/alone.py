@@ -54,7 +54,6 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.time.law_warnings import law_times
 from multiphi_exudyn.time.motion import Motion
-from multiphi_exudyn.time.record import Recorded
 from multiphi_exudyn.time.segments import Segments
 
 PHASES = tuple(Phase)
@@ -216,7 +215,7 @@ class KnownMotion:
         motion.advance(until)
         self._continuation = motion.state, motion.time
         times, _, _, truncated = motion.events.table().T
-        segments = Recorded(motion.record)  # a body reports neither defects nor works
+        segments = motion.record
         return MotionInterval(
             end=motion.time,
             events=motion.events,
@@ -225,7 +224,7 @@ class KnownMotion:
             final_state=motion.state,
             failure=motion.message,
             segments=segments,
-            phases=motion.record.start_phases(),
+            phases=segments.start_phases(),
             static_levels=motion.levels.alone,
         )
 

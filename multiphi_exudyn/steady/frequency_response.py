@@ -35,19 +35,6 @@ class FrequencyResponse(Shown):
         Frequencies in the order of the runs [Hz].
     states : tuple of SteadyState
         Steady state of every frequency.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-    >>> model = mp.MultiPhiModel(chain, [stop])
-    >>> load = mp.HarmonicLoad("tip", 2.0, 10.0)
-    >>> response = mp.frequency_response(model, load, [10.0, 12.0])
-    >>> response.orders.tolist(), response.duty("stop").tolist()
-    ([1, 1], [0.0, 0.0])
     """
 
     frequencies: np.ndarray

@@ -99,20 +99,6 @@ class SteadyState(Shown):
         x [m, rad] and x' [m/s, rad/s] at the end of the run, from which another run can continue.
     warnings : tuple of str
         Warnings about the accuracy of the trajectory, and of earlier chunks of the run.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-    >>> model = mp.MultiPhiModel(chain, [stop])
-    >>> state = mp.steady_state(model, mp.HarmonicLoad("tip", 20.0, 12.0))
-    >>> state.status, state.order
-    ('periodic', 1)
-    >>> round(state.duty("stop"), 3)  # part of the time in which the stop is closed
-    0.039
     """
 
     status: str

@@ -53,7 +53,7 @@ from multiphi_exudyn.mathematics.coulomb_impacts import CoulombImpact
 from multiphi_exudyn.mathematics.round_off import CLEAR, INDEPENDENT
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.element import friction_spring
-from multiphi_exudyn.time.segments import Segments
+from multiphi_exudyn.time.record import Record
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["TOUCHING", "friction_warnings", "impact_warnings", "is_taking", "mesh_warnings", "spread_contacts"]
@@ -68,7 +68,7 @@ FEWEST = 6  # modes of which this can be told
 ONE_ANSWER = "smaller coefficients of friction, or a finite stiffness, leave one"
 
 
-def friction_warnings(segments: Segments, model: MultiPhiModel) -> Iterator[str]:
+def friction_warnings(segments: Record, model: MultiPhiModel) -> Iterator[str]:
     """Warnings of a model with friction, at most one sentence of each kind."""
     yield from _redundant_contacts(segments)
     yield from _redundant(segments)
@@ -77,7 +77,7 @@ def friction_warnings(segments: Segments, model: MultiPhiModel) -> Iterator[str]
         yield from _backward_slip(segments)
 
 
-def _redundant_contacts(segments: Segments) -> Iterator[str]:
+def _redundant_contacts(segments: Record) -> Iterator[str]:
     """Warning of a rigid contact that touches without a force, and would rub otherwise than those that carry it."""
     base = segments.levels[0].level.base
     rigid = [i for i, contact in enumerate(base.contacts) if isinstance(contact, UnilateralContact) and contact.rigid]
@@ -100,12 +100,12 @@ def _redundant_contacts(segments: Segments) -> Iterator[str]:
                 return
 
 
-def _length(segments: Segments, place: int) -> float:
+def _length(segments: Record, place: int) -> float:
     """Duration [s] of a segment."""
     return float(segments.ends[place] - segments.starts[place])
 
 
-def _touching(segments: Segments, place: int, contacts: Sequence[int]) -> list[int]:
+def _touching(segments: Record, place: int, contacts: Sequence[int]) -> list[int]:
     """Those of the rigid contacts whose gaps are round-off in the middle of a segment."""
     level, after = segments.levels[segments.numbers[place]], 0.5 * _length(segments, place)
     xi = segments.states(np.array([place]), np.array([after]))[0, 0, : level.width]
@@ -146,7 +146,7 @@ def _rub_alike(base: ModalBase, one: int, other: int) -> bool:
     )
 
 
-def _redundant(segments: Segments) -> Iterator[str]:
+def _redundant(segments: Record) -> Iterator[str]:
     """Warning of the redundant friction with the smallest ratio of kinetic to static limit."""
     frictions = _rigid_friction(segments)
     pairs = [(one, other) for one in frictions for other in frictions if one is not other and one.drop > 0]
@@ -180,7 +180,7 @@ class _RigidFriction(NamedTuple):
         return self.drop > 0 and before[self.element] == self.sticks < after[self.element]
 
 
-def _rigid_friction(segments: Segments) -> list[_RigidFriction]:
+def _rigid_friction(segments: Record) -> list[_RigidFriction]:
     base, frictions = segments.levels[0].level.base, []
     for i, element in enumerate(base.contacts):
         sticks, number, spring, drop = friction_spring(element)
@@ -218,7 +218,7 @@ def _redundancies(
     yield math.sqrt(1.0 - one.drop), one.name, tuple(dict.fromkeys(base.contacts[k].name for k in involved))
 
 
-def _decided_in_turn(segments: Segments) -> Iterator[str]:
+def _decided_in_turn(segments: Record) -> Iterator[str]:
     """Warning of friction at rigid contacts that changes direction at one instant with other friction."""
     frictions = _rigid_friction(segments)
     if len(frictions) < 2 or not any(friction.pressed for friction in frictions):
@@ -251,7 +251,7 @@ def _coupled(base: ModalBase, one: _RigidFriction, other: _RigidFriction) -> boo
     return bool(np.any(np.abs(first.T @ second) > INDEPENDENT * sizes))
 
 
-def _backward_slip(segments: Segments) -> Iterator[str]:
+def _backward_slip(segments: Record) -> Iterator[str]:
     """Warning of the friction with the largest share of slip time at a speed against it, sampled in mid-segment.
 
     Segments with all exits armed have no such speed and are left out.
@@ -312,7 +312,7 @@ def mesh_warnings(trajectory: Trajectory, spread: Sequence[str]) -> Iterator[str
     if not names:
         return
     taken = trajectory.start_loss.impact + float(sum(losses[index(name)] for name in names))
-    largest = max(trajectory.segments.sizes(trajectory.t_end)[1], abs(trajectory.initial_energy))
+    largest = max(trajectory.ending.record.sizes(trajectory.t_end)[1], abs(trajectory.initial_energy))
     if taken > TAKEN * largest:
         yield (
             f"mesh impacts: impacts on {', '.join(map(repr, names))} took {per_cent(taken / largest)} of the largest "

@@ -9,7 +9,6 @@ History figure: displacements, contact forces below them, and in grey the times 
 
 from __future__ import annotations
 
-import functools
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -21,7 +20,7 @@ from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.events.transitions.state import Event, total_impulse
 from multiphi_exudyn.mechanics.arguments import no_text
 from multiphi_exudyn.mechanics.structure import At
-from multiphi_exudyn.time.segments import Segment, Segments, as_segments
+from multiphi_exudyn.time.segments import Segment, Segments
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,7 +43,7 @@ class Histories(Shown, ABC):
     MultiPhiValueError and MultiPhiTypeError for a time outside of the motion, and for an unknown name.
     """
 
-    segments: Sequence[Segment]
+    segments: Segments
     events: Sequence[Event]
     t_end: float
     message: str
@@ -91,21 +90,7 @@ class Histories(Shown, ABC):
         """x_inf,l (n,) [m, rad]."""
 
     def displacement(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
-        """x [m, rad] of all degrees of freedom: (n,) for a scalar t, (n, k) for (k,) times.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> import multiphi_exudyn as mp
-        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-        >>> model = mp.MultiPhiModel(chain, [stop])
-        >>> pulled = model.static_equilibrium({"tip": 100.0})
-        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
-        >>> print(1e3 * tr.displacement(0.0).round(6))  # mm
-        [2.5 5.  7.5]
-        """
+        """x [m, rad] of all degrees of freedom: (n,) for a scalar t, (n, k) for (k,) times."""
         return self._configurations(t, side, 0)
 
     def velocity(self, t: float | np.ndarray, side: str = "right") -> np.ndarray:
@@ -119,22 +104,9 @@ class Histories(Shown, ABC):
         )
 
     def at(self, point: At, t: float | np.ndarray, side: str = "right", derivative: int = 0) -> float | np.ndarray:
-        """Displacement [m] of a point (name, {point: coefficient} or row): a float for a scalar t, (k,) for (k,) times.
+        """Displacement [m] of a point (name, {point: coefficient} or row): a float, or (k,) for (k,) times.
 
         derivative: 1 for its velocity [m/s], 2 for its acceleration [m/s2].
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> import multiphi_exudyn as mp
-        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-        >>> model = mp.MultiPhiModel(chain, [stop])
-        >>> pulled = model.static_equilibrium({"tip": 100.0})
-        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
-        >>> round(1e3 * tr.at("tip", 0.0), 3)  # mm
-        7.5
         """
         if derivative not in (0, 1, 2):
             raise MultiPhiValueError(f"derivative: got {derivative!r}, need 0, 1 or 2")
@@ -156,20 +128,6 @@ class Histories(Shown, ABC):
         """Contact force lambda >= 0 [N]: a float for a scalar t, (k,) for (k,) times.
 
         Impacts of rigid contacts are impulses, not forces: ``contact_impulse``.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> import multiphi_exudyn as mp
-        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-        >>> model = mp.MultiPhiModel(chain, [stop])
-        >>> pulled = model.static_equilibrium({"tip": 100.0})
-        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
-        >>> force = tr.contact_force("stop", np.linspace(0.0, 0.5, 2001))
-        >>> print(f"{force.max():.0f} N")
-        484 N
         """
         return self._values("contact_force", contact, t, side)
 
@@ -179,25 +137,11 @@ class Histories(Shown, ABC):
         first, last = float(self._times(t0)[0]), float(self._times(t1)[0])
         if first > last:
             raise MultiPhiValueError(f"contact_impulse: got t0 = {t0!r} > t1 = {t1!r}, need t0 <= t1")
-        return self._segments.integral(row, first, last) + total_impulse(self.events, contact, first, last)
+        return self.segments.integral(row, first, last) + total_impulse(self.events, contact, first, last)
 
     def contact_intervals(self, contact: str) -> list[tuple[float, float]]:
-        """[(closed at, opened at), ...] [s]; one still closed at the end ends at t_end, instants are left out.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> import multiphi_exudyn as mp
-        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-        >>> model = mp.MultiPhiModel(chain, [stop])
-        >>> pulled = model.static_equilibrium({"tip": 100.0})
-        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
-        >>> [round(t, 4) for t in tr.contact_intervals("stop")[0]]
-        [0.0197, 0.0229]
-        """
-        return self._segments.intervals(self._holds("contact_intervals", contact))
+        """[(closed at, opened at), ...] [s]; one still closed at the end ends at t_end, instants are left out."""
+        return self.segments.intervals(self._holds("contact_intervals", contact))
 
     def friction_force(self, name: str, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """T [N] of a friction, whose force on the structure is -h T: a float for a scalar t, (k,) for (k,) times."""
@@ -215,7 +159,7 @@ class Histories(Shown, ABC):
 
         Instants are left out: a block without a spring that turns sticks at one and slips on.
         """
-        return np.array(self._segments.intervals(self._holds("stick_intervals", name))).reshape(-1, 2)
+        return np.array(self.segments.intervals(self._holds("stick_intervals", name))).reshape(-1, 2)
 
     def energy(self, t: float | np.ndarray, side: str = "right") -> float | np.ndarray:
         """Kinetic + strain energy [J], closed compliant contacts and force laws included: a float, or (k,)."""
@@ -238,19 +182,6 @@ class Histories(Shown, ABC):
         ------
         MultiPhiValueError
             For an unknown name, or a time outside of the motion.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> import multiphi_exudyn as mp
-        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-        >>> model = mp.MultiPhiModel(chain, [stop])
-        >>> pulled = model.static_equilibrium({"tip": 100.0})
-        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
-        >>> list(tr.to_dataframe().columns)
-        ['tip', 'gap stop', 'force stop']
         """
         from pandas import DataFrame, Index
 
@@ -291,8 +222,7 @@ class Histories(Shown, ABC):
 
     def _configurations(self, t: float | np.ndarray, side: str, derivative: int) -> np.ndarray:
         times = self._times(t)
-        segments = self._segments
-        places = segments.owners(times, _side(side))
+        segments, places = self.segments, self.segments.owners(times, _side(side))
         states = segments.states(places, times - segments.starts[places])
         numbers, result = segments.numbers[places], np.empty((0, len(times)))
         for number in np.unique(numbers).tolist():
@@ -306,14 +236,14 @@ class Histories(Shown, ABC):
     def _values(self, quantity: str, name: At, t: float | np.ndarray, side: str) -> Any:
         """A row of (xi, xi', 1) at times: a float, or (k,)."""
         row = self._row(quantity, name)
-        values = self._segments.values(self._times(t), _side(side), row)
+        values = self.segments.values(self._times(t), _side(side), row)
         return values if np.ndim(t) else float(values[0])
 
     def _evaluate(
         self, t: float | np.ndarray, side: str, values: Callable[[Segment, np.ndarray], np.ndarray]
     ) -> float | np.ndarray:
         """``values`` (..., k) of the segments that own the times."""
-        result = self._segments.evaluated(self._times(t), _side(side), values)
+        result = self.segments.evaluated(self._times(t), _side(side), values)
         if np.ndim(t) == 0:
             return float(result[0]) if result.ndim == 1 else result[:, 0]
         return result
@@ -333,10 +263,6 @@ class Histories(Shown, ABC):
             interval = " to ".join(f"{t:g}" for t in sorted({np.min(times), np.max(times)}))
             raise MultiPhiValueError(f"t: got {interval} s, need {self.t_start:g} <= t <= {self.t_end:g} s")
         return times
-
-    @functools.cached_property
-    def _segments(self) -> Segments:
-        return as_segments(self.segments)
 
 
 def _side(side: str) -> str:

@@ -64,21 +64,6 @@ class Ledger(Shown):
         Limits times slip on the counter-surfaces, and losses of springs where a static limit is exceeded [J].
     final : float
         Kinetic + strain energy [J] at the end.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-    >>> model = mp.MultiPhiModel(chain, [stop])
-    >>> pulled = model.static_equilibrium({"tip": 100.0})
-    >>> tr = mp.simulate(model, 0.5, displacement=pulled)
-    >>> print(f"{tr.ledger.initial:.3f} J, of which damping took {tr.ledger.damping:.3f} J")
-    0.375 J, of which damping took 0.310 J
-    >>> abs(tr.ledger.residual) < 1e-12 * tr.ledger.initial
-    True
     """
 
     initial: float
@@ -184,6 +169,6 @@ class FinalState:
             events=events,
             segments=segments,
             function_evaluations=self.record.trajectory.evaluations,
-            record_bytes=self.record.bytes,
+            record_bytes=self.record.trajectory.memory,
             array_bytes=self.record.core_levels.bytes,
         )

@@ -15,7 +15,6 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -35,7 +34,7 @@ from multiphi_exudyn.time.model_warnings import grouped, issue, row_warnings
 from multiphi_exudyn.time.motion import Motion, core_start, limits
 from multiphi_exudyn.time.segments import point_row
 from multiphi_exudyn.time.simulate import Run, checked_end, holding, refined, run_with_warnings
-from multiphi_exudyn.time.start import Start, first_start
+from multiphi_exudyn.time.start import Start, Starts
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["ManyRuns", "StartVectors", "Task", "simulate_many"]
@@ -70,18 +69,6 @@ class ManyRuns:
         The causes.
     warnings : tuple of tuple of str
         What to distrust in each.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-    >>> model = mp.MultiPhiModel(chain, [stop])
-    >>> runs = mp.simulate_many(model, 0.5, velocities=np.diag([0.5, 0.5, 0.5]), points=["tip"])
-    >>> runs.samples.shape, set(runs.status)
-    ((3, 1, 1), {'ok'})
     """
 
     points: tuple[At, ...]
@@ -214,10 +201,6 @@ class Task:
         self.samples, self.ends = np.full((count, len(points), len(times)), np.nan), np.zeros(count)
         self.events, self.results = np.zeros(count, int), [("failed", "", tuple[str, ...]())] * count
 
-    def levels(self, key: object, build: Any) -> LoadedLevels:
-        """The levels under the loads, which all runs share (simulate.SharedResources)."""
-        return self._kept.get_or_build(key, build)
-
     def carry_out(self, threads: int, bar: Any) -> None:
         """Do all runs; the first ones, one after the other, decide the modes of a Tolerance."""
         model, numbers = self._given.model, list(range(len(self._starts)))
@@ -232,55 +215,30 @@ class Task:
             segments = self._run_batch(batch, threads)
             bar.update(len(batch))
 
-    def _run(self, number: int) -> Run:
-        displacement, velocity = self._starts[number]
-        return replace(self._given, displacement=displacement, velocity=velocity, shared=self)
-
     def _run_batch(self, numbers: Sequence[int], threads: int) -> int:
         """Do a batch of runs; return the largest number of segments of one."""
         given, end = self._given, self._given.t_end
-        levels = replace(given, model=given.model.decided or given.model, shared=self).levels()
-        waiting, starts = list[int](), list[Start]()
+        levels = replace(given, model=given.model.decided or given.model, shared=self._kept).levels()
+        waiting, starts, rule = list[int](), list[Start](), Starts(levels, end)
         for number in numbers:
             try:
-                starts.append(first_start(levels, end, *self._starts[number]))
+                starts.append(rule.first(*self._starts[number]))
                 waiting.append(number)
             except MultiPhiError as error:
                 self.results[number] = "failed", str(error), ()
         built, window = core_levels(levels), limits(levels.model)
         given_starts = [core_start(levels, start) for start in starts]
         runs = core.run_batch(built, given_starts, *window, levels.drive.time, end, threads)
-        done = [k for k, run in enumerate(runs) if run.is_complete]
-        self._sample_batch(levels, built, [runs[k].trajectory for k in done], [waiting[k] for k in done], threads)
         largest = 0
         for k, run in enumerate(runs):
             ahead = Motion.ended(levels, built, starts[k], run) if run.is_complete else None
             largest = max(largest, self._finish(waiting[k], ahead))
         return largest
 
-    def _sample_batch(
-        self,
-        levels: LoadedLevels,
-        built: core.Levels,
-        trajectories: Sequence[core.Trajectory],
-        numbers: Sequence[int],
-        threads: int,
-    ) -> None:
-        """Sample the points in runs that have reached their end."""
-        if self._points and len(self.times) and trajectories:
-            points = self._rows_of(levels.model)
-            keys = set(map(tuple, chain.from_iterable(trajectory.keys for trajectory in trajectories)))
-            visited = {key: levels.level(key) for key in keys}
-            rows: dict[Sequence[int], np.ndarray] = {
-                key: np.array([point_row(point, level) for point in points]) for key, level in visited.items()
-            }
-            values = core.sample_batch(built, trajectories, rows, self.times.tolist(), threads)
-            self.samples[numbers] = np.asarray(values).reshape(len(numbers), len(points), -1)
-
     def _finish(self, number: int, ahead: Motion | None) -> int:
         """Keep the results of a run, done alone unless it is ``ahead``; return its number of segments."""
-        run = self._run(number)
-        run.ahead = ahead
+        x, x_t = self._starts[number]
+        run = replace(self._given, displacement=x, velocity=x_t, shared=self._kept, ahead=ahead)
         try:
             trajectory = run_with_warnings(run)
         except MultiPhiError as error:
@@ -288,8 +246,7 @@ class Task:
             return 0
         self.events[number], self.ends[number] = len(trajectory.events), trajectory.t_end
         self.results[number] = trajectory.status, trajectory.message, trajectory.warnings
-        if ahead is None:
-            self._sample(number, trajectory)
+        self._sample(number, trajectory)
         return len(trajectory.segments)
 
     def _sample(self, number: int, trajectory: Trajectory) -> None:

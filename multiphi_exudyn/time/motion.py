@@ -24,7 +24,7 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.time.core_levels import core_levels
 from multiphi_exudyn.time.ledger import NUMBERS, FinalState
-from multiphi_exudyn.time.record import PHASES, Events, Record, Recorded
+from multiphi_exudyn.time.record import PHASES, Events, Record
 from multiphi_exudyn.time.start import Start
 from multiphi_exudyn.time.trajectory import Rerun, Trajectory
 
@@ -145,7 +145,7 @@ class Motion:
         final = self._final()
         return Trajectory(
             model=self.model,
-            segments=Recorded(final.record),
+            segments=final.record,
             events=Events(final.record),
             t_end=self.time if self.message else end,
             status="failed" if self.message else "ok",
@@ -225,11 +225,6 @@ def limits(model: MultiPhiModel) -> tuple[int, float]:
     Both grow with the number of contacts: stops side by side are all struck in a small part of a period, once each.
     An oscillation passes every knot of a force law twice.
     """
-    window_and_limit: tuple[int, float] = model.entries.get_or_build("chatter", lambda: _limits(model))
-    return window_and_limit
-
-
-def _limits(model: MultiPhiModel) -> tuple[int, float]:
     contacts = max(1, len(model.contacts) - len(model.force_laws))  # that are no force laws
     knots = sum(law.levels for law in model.force_laws)
     return CHATTER_WINDOW * contacts, EVENTS_PER_PERIOD * contacts + 2 * knots

@@ -118,33 +118,20 @@ REMEDY = (
 
 
 def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[str, ...]:
-    """Warnings of a run, one sentence each; tolerance: the one that decided its modes.
-
-    All warnings but those of the ledger, of a far rest and of truncation are the same for runs of one length in the
-    same levels, and are cached for them, unless friction, a force law that is approximated or at an end of its span, or
-    the model's own check needs the motion of every run.
-    """
+    """Warnings of a run, one sentence each; tolerance: the one that decided its modes."""
     record, model = trajectory.ending.record, trajectory.model
-    visited, cache = record.visited, record.loaded.told
-    if not visited:
+    if not record.visited:
         return ()
-    begun = trajectory.start.states
-    key = visited, begun, trajectory.t_end, trajectory.start.time
-    entry = cache.find(key)
-    if entry is None:
-        general = ModelWarnings.of(model, trajectory.segments)
-        first = record.loaded.kept(begun)  # a run may leave it at once, so that it has no segment there
-        passed = [*trajectory.segments.levels, *([] if begun in visited or first is None else [first])]
-        entry = general, FarRest.of(passed), *general.for_run(trajectory)
-        if not general.needs_motion:
-            cache.keep(key, entry)
-    general, rest, before, after = entry
-    after = (*after, *rest.warnings(trajectory))
+    general, begun = ModelWarnings.of(model, record), trajectory.start.states
+    first = record.loaded.kept(begun)  # a run may leave it at once, so that it has no segment there
+    passed = [*record.levels, *([] if begun in record.visited or first is None else [first])]
+    before, after = general.for_run(trajectory)
+    after = (*after, *FarRest.of(passed).warnings(trajectory))
     if not trajectory.ending.ledger.is_balanced or len(record.left_out):
         before = (*ledger_warnings(trajectory), *before)
     if general.spread and is_taking(trajectory.ending.ledger):
         after = (*mesh_warnings(trajectory, general.spread), *after)
-    share, error = trajectory.segments.verdict
+    share, error = record.truncation.energy_share, record.truncation.motion
     if tolerance is not None or not (share >= 0 and error >= 0):
         share, error = verdict_of(trajectory, tolerance)
     if tolerance is None and not (share > 0 or error > 0):
@@ -218,7 +205,7 @@ class ModelWarnings:
         yield from law_warnings(trajectory)
         yield from span_warnings(trajectory)
         if model.general:
-            yield from friction_warnings(trajectory.segments, model)
+            yield from friction_warnings(trajectory.ending.record, model)
             yield from impact_warnings(trajectory)
 
 
@@ -350,4 +337,4 @@ def _largest(trajectory: Trajectory) -> float:
     omega, span = trajectory.model.base.modes.omega, trajectory.t_end - trajectory.start.time
     times = np.minimum(np.divide(1.0, omega, out=np.full(len(omega), span), where=omega > 0), span)
     loads = trajectory.segments.levels[0].excitation.largest_load
-    return max(trajectory.segments.sizes(trajectory.t_end)[1], kinetic, 0.5 * float(np.sum((loads * times) ** 2)))
+    return max(trajectory.ending.record.sizes(trajectory.t_end)[1], kinetic, 0.5 * float(np.sum((loads * times) ** 2)))

@@ -43,7 +43,7 @@ from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.histories import Histories
 from multiphi_exudyn.time.ledger import Ledger, Statistics
-from multiphi_exudyn.time.segments import Flow, Segment
+from multiphi_exudyn.time.segments import Segment, Segments
 
 __all__ = [
     "KINDS",
@@ -95,24 +95,9 @@ class SavedTrajectory(Histories):
         Work of the run.
     header : mapping
         Contents of the file: names of points, contacts and frictions, states of the levels.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import multiphi_exudyn as mp
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-    >>> model = mp.MultiPhiModel(chain, [stop])
-    >>> pulled = model.static_equilibrium({"tip": 100.0})
-    >>> tr = mp.simulate(model, 0.5, displacement=pulled)
-    >>> tr.save("run.npz")
-    >>> saved = mp.load_trajectory("run.npz")
-    >>> saved.points, saved.contacts, len(saved.events) == len(tr.events)
-    (('tip',), ('stop',), True)
     """
 
-    segments: Sequence[Segment]
+    segments: Segments
     events: Sequence[Event]
     t_end: float
     status: str
@@ -360,14 +345,14 @@ def segment_arrays(segments: Sequence[Segment], numbers: Sequence[int]) -> dict[
         "segment_level": np.array(numbers, np.int64),
         "term_count": np.array([len(basis.rates) for basis in bases], np.int64),
         "unit": np.array([basis.unit for basis in bases]),
-        "free": np.array([segment.flow.free for segment in segments], np.int64),
+        "free": np.array([segment.free for segment in segments], np.int64),
         "rate": np.concatenate([np.zeros(0, complex), *(basis.rates for basis in bases)]),
         "power": np.concatenate([np.zeros(0, np.int64), *(basis.powers for basis in bases)]),
         "coefficient": np.concatenate([np.zeros(0, complex), *(segment.rows.ravel() for segment in segments)]),
     }
 
 
-def segments_from(levels: Sequence[Any], arrays: Mapping[str, np.ndarray]) -> tuple[Segment, ...]:
+def segments_from(levels: Sequence[Any], arrays: Mapping[str, np.ndarray]) -> Segments:
     """Segments from the arrays."""
     counts, owners = arrays["term_count"].tolist(), arrays["segment_level"].tolist()
     terms = pairwise(accumulate(counts, initial=0))
@@ -376,11 +361,10 @@ def segments_from(levels: Sequence[Any], arrays: Mapping[str, np.ndarray]) -> tu
     segments = []
     for k, ((first, last), (begin, end)) in enumerate(zip(terms, blocks, strict=True)):
         basis = Exponentials(arrays["rate"][first:last], arrays["power"][first:last], float(arrays["unit"][k]))
-        shapes = arrays["coefficient"][begin:end].reshape(-1, counts[k])
-        flow = Flow(basis, shapes, np.ones(counts[k]), int(arrays["free"][k]))
+        rows = arrays["coefficient"][begin:end].reshape(-1, counts[k])
         spans = float(arrays["segment_start"][k]), float(arrays["segment_end"][k])
-        segments.append(Segment(*spans, levels[owners[k]], flow, phases=(), armed_at=0.0))
-    return tuple(segments)
+        segments.append(Segment(*spans, levels[owners[k]], basis, rows, int(arrays["free"][k])))
+    return Segments(segments)
 
 
 def elements_of(events: Sequence[Event]) -> Iterator[str]:

@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.model.mode_choice import Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
+from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.loads import Load, StopsMotion, patterns, unchanging
 from multiphi_exudyn.mechanics.time_functions import Harmonic, Smooth, Sweep
@@ -32,14 +32,13 @@ from multiphi_exudyn.time.continuation import continued_start, with_final_veloci
 from multiphi_exudyn.time.model_warnings import base_warnings, issue
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.run_warnings import warnings_of
-from multiphi_exudyn.time.segments import Segment, as_segments
-from multiphi_exudyn.time.start import first_start
+from multiphi_exudyn.time.segments import Segment
+from multiphi_exudyn.time.start import Starts
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.truncation import run_with_enough_modes
 
 __all__ = [
     "Run",
-    "SharedResources",
     "base_warnings_of",
     "check_start",
     "checked_end",
@@ -174,19 +173,12 @@ def holding(
     return model.holding(np.vstack([patterns(model.structure, loads), *rows]))
 
 
-class SharedResources(Protocol):
-    """Levels and arrays that many runs of one model under the same loads share (many.py)."""
-
-    def levels(self, key: object, build: Callable[[], LoadedLevels]) -> LoadedLevels:
-        """Return the levels under the loads, build once."""
-
-
 @dataclass
 class Run:
     """Arguments of ``simulate``, which documents them; t_end [s].
 
-    rewound: whether time begins anew at the end of ``start``, for periodic loads over whole periods. shared: levels and
-    arrays that it shares with other runs, None where it is alone. ahead: its motion, where it is already at the end.
+    rewound: whether time begins anew at the end of ``start``, for periodic loads over whole periods. shared: levels
+    under the loads that it shares with other runs. ahead: its motion, where it is already at the end.
     """
 
     model: MultiPhiModel
@@ -196,7 +188,7 @@ class Run:
     loads: Sequence[Load] = ()
     start: Trajectory | Equilibrium | None = None
     rewound: bool = False
-    shared: SharedResources | None = None
+    shared: BoundedCache[object, LoadedLevels] | None = None
     ahead: Motion | None = None
 
     def trajectory(self) -> Trajectory:
@@ -222,7 +214,7 @@ class Run:
             return self.ahead
         before, levels = self._before, self.levels(finer)
         if before is None:
-            start = first_start(levels, self.t_end, self.displacement, self.velocity, self.rest)
+            start = Starts(levels, self.t_end).first(self.displacement, self.velocity, self.rest)
         else:
             start = continued_start(before, levels, self.rewound)
         return Motion(levels, start)
@@ -250,7 +242,7 @@ class Run:
             return LoadedLevels.under(model, excitation, time, self.t_end, lasting=self.t_end)
 
         if self.shared is not None:
-            return self.shared.levels((id(model), finer), build)
+            return self.shared.get_or_build((id(model), finer), build)
         return build() if loads is None else model.loaded.get_or_build((loads, time, self.t_end, finer), build)
 
     def _with_decided_modes(self) -> Trajectory:
@@ -343,7 +335,7 @@ def _interpolation_error(trajectory: Trajectory) -> float:
     if error_bound == 0:
         return 0.0
     times = np.linspace(trajectory.start.time, trajectory.t_end, SAMPLES)
-    energies = as_segments(trajectory.segments).evaluated(times, "right", _size_of_energy)
+    energies = trajectory.segments.evaluated(times, "right", _size_of_energy)
     return error_bound / max(math.sqrt(2 * float(np.max(energies))), np.finfo(float).tiny)
 
 

@@ -249,7 +249,7 @@ class Trajectory(ModelHistories):
         if not self.segments:
             raise NumericalFailure(f"ledger: got a run without motion ({self.message}), need one that has started")
         ending = self.ending
-        return ledger_of(ending.ledger, self.segments.works, self._static_work, self.initial_energy, ending.energy)
+        return ledger_of(ending.ledger, ending.record.works, self._static_work, self.initial_energy, ending.energy)
 
     @property
     def _static_work(self) -> float:
@@ -306,19 +306,6 @@ class Trajectory(ModelHistories):
             For a tolerance out of range.
         NumericalFailure
             For a run that failed at its start.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> import multiphi_exudyn as mp
-        >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-        >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-        >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-        >>> model = mp.MultiPhiModel(chain, [stop])
-        >>> pulled = model.static_equilibrium({"tip": 100.0})
-        >>> tr = mp.simulate(model, 0.5, displacement=pulled)
-        >>> tr.horizon(0.01)  # to the end: this run is determined
-        0.5
         """
         if not (is_real(tolerance) and 0 < tolerance < 1):
             raise MultiPhiValueError(f"tolerance: got {tolerance!r}, need a number between 0 and 1")

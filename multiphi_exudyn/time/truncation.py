@@ -33,7 +33,6 @@ Truncation warnings: sentences on energy and motion lost to truncation, from the
 from __future__ import annotations
 
 import copy
-import functools
 import itertools
 import math
 from collections.abc import Callable
@@ -53,7 +52,7 @@ from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.model.mode_choice import TRIED, Tolerance, UpTo
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.time.model_warnings import REMEDY
-from multiphi_exudyn.time.segments import Segments
+from multiphi_exudyn.time.record import Record
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = [
@@ -80,7 +79,6 @@ ABOVE = 1 + 1e-9  # of its last mode's frequency: the cut-off that keeps this mo
 
 INDICATOR = core.MOTION_THRESHOLD
 CHANGE = "change"  # entry of a model: the last change by more modes, where it exceeds what a Tolerance allows
-TEXTS = 64  # verdicts whose sentences are kept
 RIGID_INDICATOR = 0.05  # threshold where a rigid contact is struck: impacts raise the indicator more than the error
 
 
@@ -258,14 +256,14 @@ class DefectHistory:
     segments: of the run. places: indices (k,) of those that begin with a defect. squares: |defect|^2 (k,) [m2 kg].
     """
 
-    segments: Segments
+    segments: Record
     places: np.ndarray
     squares: np.ndarray
 
     @classmethod
     def of(cls, trajectory: Trajectory) -> DefectHistory:
         """Defects of a run with segments."""
-        segments = trajectory.segments
+        segments = trajectory.ending.record
         table = event_table(trajectory.events, trajectory.model.index)
         stopped = _stopped(table, segments.starts)
         transitions = _transitions(segments.numbers, stopped)
@@ -290,7 +288,7 @@ class DefectHistory:
 
 def total_defect(trajectory: Trajectory) -> float:
     """Sum of |defect|^2 [m2 kg] over the segments of a run, from the loop where it has summed them."""
-    from_loop = trajectory.segments.defects
+    from_loop = trajectory.ending.record.truncation.defects
     return float(np.sum(DefectHistory.of(trajectory).squares)) if math.isnan(from_loop) else from_loop
 
 
@@ -345,12 +343,12 @@ def verdict_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tu
     if trajectory.model.whole:
         return 0.0, 0.0
     limit, ledger = indicator_threshold(tolerance), trajectory.ending.ledger
-    found = copy.copy(trajectory.ending.record.trajectory.truncation)
+    found = copy.copy(trajectory.ending.record.truncation)
     found.defects = total_defect(trajectory)
     found.start_square = found.start_square or float(np.sum(trajectory.start.displacement**2))
     found.estimate(ledger, limit)
     if math.isnan(found.energy_share) or math.isnan(found.motion):
-        found.mean_square, found.largest_energy = trajectory.segments.sizes(trajectory.t_end)
+        found.mean_square, found.largest_energy = trajectory.ending.record.sizes(trajectory.t_end)
         found.estimate(ledger, limit)
     return found.energy_share, found.motion
 
@@ -382,7 +380,6 @@ def _of_tolerance(model: MultiPhiModel, share: float, error: float, tolerance: T
     return ""
 
 
-@functools.lru_cache(TEXTS)
 def _sentence(share: float, error: float, struck: bool) -> tuple[str, ...]:
     """One warning of a verdict on a run whose modes no tolerance has decided: of its motion, else of its energy.
 

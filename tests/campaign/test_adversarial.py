@@ -17,7 +17,7 @@ from strategies import CHOICES, Recipe, built, cases
 from multiphi_exudyn import ConstantLoad, LinearStructure, MultiPhiModel, UnilateralContact, simulate
 from multiphi_exudyn.study.stability.run_laws import complaints, missed
 from multiphi_exudyn.study.stability.run_signals import Signal
-from multiphi_exudyn.time.segments import SegmentList
+from multiphi_exudyn.time.segments import Segments
 
 DISTINCT = ("chain", "free chain", "dense", "wide")  # frequencies: of repeated ones a truncated basis may keep any
 DENSE = 1e4  # samples of the shortest period
@@ -290,7 +290,7 @@ class TestTheChecksSee:
     def ending(self, run, end):
         """The run whose first segment ends at another time, as if its event had been found there."""
         first, *others = run.segments
-        return dataclasses.replace(run, segments=SegmentList([dataclasses.replace(first, end=end), *others]))
+        return dataclasses.replace(run, segments=Segments([dataclasses.replace(first, end=end), *others]))
 
     def test_a_missed_event(self):
         run = run_of(built(self.CASE))
@@ -306,12 +306,10 @@ class TestTheChecksSee:
     def test_energy_out_of_nothing(self):
         run = run_of(built(self.CASE))
         first, *others = run.segments
-        weaker = dataclasses.replace(
-            first, flow=dataclasses.replace(first.flow, coefficients=0.9 * first.flow.coefficients)
-        )
+        weaker = dataclasses.replace(first, rows=0.9 * first.rows)
         slower = dataclasses.replace(run.start, velocity=0.9 * run.start.velocity)
         for wrong, complaint in (
-            ({"segments": SegmentList([weaker, *others])}, "energy: rises"),
+            ({"segments": Segments([weaker, *others])}, "energy: rises"),
             ({"start": slower}, "ledger: residual"),
         ):
             found = complaints(dataclasses.replace(run, **wrong))

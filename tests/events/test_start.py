@@ -51,7 +51,7 @@ def test_a_level_at_its_own_rest_has_no_round_off_of_its_place():
     model = mp.MultiPhiModel(chain(6), [stop("m5", 0.1, 40.0), stop("m2", 0.5, name="far")], modes="all")
     rest = model.static_equilibrium({"m5": -3.0})
     run = started(model, None, rest, [mp.ConstantLoad("m5", -3.0)])
-    assert not np.any(run.segments[0].flow.coefficients)
+    assert not np.any(run.segments[0].rows)
 
 
 def test_stops_that_move_strike_with_their_own_speed():

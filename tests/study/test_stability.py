@@ -21,7 +21,7 @@ from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
 from multiphi_exudyn.study.stability.report import render_stability, text_table
 from multiphi_exudyn.study.stability.run_laws import energy_rise
 from multiphi_exudyn.study.stability.summary import contents, failures, summaries
-from multiphi_exudyn.time.segments import SegmentList
+from multiphi_exudyn.time.segments import Segments
 from reference_models.full_matrices import run_matrices
 
 pytestmark = pytest.mark.usefixtures("few_elements")
@@ -91,7 +91,7 @@ class TestTheJudgeSees:
         problem, trajectory = honest
         first = trajectory.segments[0]
         passed = dataclasses.replace(first, end=trajectory.t_end)
-        through = dataclasses.replace(trajectory, segments=SegmentList((passed,)), events=())
+        through = dataclasses.replace(trajectory, segments=Segments((passed,)), events=())
         assert judge(problem, through, BUDGET).missed >= 1
 
     def test_an_energy_that_nobody_gave(self, honest):
@@ -116,7 +116,7 @@ class TestTheJudgeSees:
         trajectory = simulate(problem.model(), 4.0, problem.displacement)
         assert complaints(problem, trajectory) == ""
         pulled = [dataclasses.replace(s, level=_with_forces(s.level, -1.0)) for s in trajectory.segments]
-        assert "pulls" in complaints(problem, dataclasses.replace(trajectory, segments=SegmentList(pulled)))
+        assert "pulls" in complaints(problem, dataclasses.replace(trajectory, segments=Segments(pulled)))
 
 
 def test_a_user_object_is_right_or_wrong_or_too_coarse(honest):
@@ -201,7 +201,7 @@ class TestTheJudgeKnowsLaws:
         i = next(i for i, s in enumerate(trajectory.segments) if s.level.level.indices and s.end < trajectory.t_end)
         held = dataclasses.replace(trajectory.segments[i], end=trajectory.segments[i + 1].end)
         segments = (*trajectory.segments[:i], held, *trajectory.segments[i + 2 :])
-        told = complaints(problem, dataclasses.replace(trajectory, segments=SegmentList(segments)))
+        told = complaints(problem, dataclasses.replace(trajectory, segments=Segments(segments)))
         assert "a contact pulls" in told
 
     def test_of_a_force_law_whose_springs_are_not_its_own(self):

@@ -12,7 +12,6 @@ import multiphi_exudyn as mp
 from multiphi_exudyn.events.excitation.excitation import Excitation
 from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.time.core_levels import core_levels
-from multiphi_exudyn.time.segments import as_segments
 from multiphi_exudyn.time.simulate import Run
 from multiphi_exudyn.time.truncation import defects, total_defect
 
@@ -33,7 +32,7 @@ def of_instants(run):
 
     Of those with one decision; who is struck stays closed.
     """
-    segments, base, found = as_segments(run.segments), run.model.base, {}
+    segments, base, found = run.segments, run.model.base, {}
     for k in range(1, len(segments.starts)):
         before, after = (segments.levels[segments.numbers[i]] for i in (k - 1, k))
         if before.states == after.states or np.count_nonzero(segments.starts == segments.starts[k]) > 1:
@@ -128,7 +127,7 @@ def test_what_a_struck_contact_removes_is_added_where_one_opens_again(restitutio
     stop = mp.UnilateralContact("stop", "m5", 0.05, restitution=restitution)
     run = simulated(mp.MultiPhiModel(chain(7), [stop], modes=3), END, velocity=-np.linspace(0.1, 0.4, 7))
     exact = sum(defect.size**2 for defect in defects(run))
-    assert_allclose(run.segments.defects, exact, rtol=1e-9)
+    assert_allclose(run.segments.truncation.defects, exact, rtol=1e-9)
 
 
 def test_what_an_impulse_leaves_out_is_the_same_under_a_load_that_varies():

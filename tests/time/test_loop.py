@@ -118,9 +118,9 @@ def test_a_run_that_is_asked_on_its_way_goes_on_as_if_it_had_not_been():
         assert other.trajectory(end).segments.sizes(end)[0] > 0
     found, expected = other.trajectory(0.4), whole.trajectory(0.4)
     assert np.array_equal(found.events.table(), expected.events.table())
-    assert (found.segments.defects, found.segments.truncated) == (
-        expected.segments.defects,
-        expected.segments.truncated,
+    assert (found.segments.truncation.defects, found.segments.truncation.truncated_energy) == (
+        expected.segments.truncation.defects,
+        expected.segments.truncation.truncated_energy,
     )
     assert found.ledger == expected.ledger
 
@@ -144,12 +144,13 @@ class TestLazyResults:
         return mp.simulate(model, 0.5, displacement=start)
 
     def test_are_sequences(self, run):
-        for found in (run.segments, run.events):
-            assert found[0] is found[0]
-            assert found[-1] == found[len(found) - 1] == list(found)[-1]
-            assert found[1:3] == (found[1], found[2])
-            assert found == tuple(found)
-            assert found != found[1:]
+        events, segments = run.events, run.segments
+        assert events[-1] == events[len(events) - 1] == list(events)[-1]
+        assert events[1:3] == (events[1], events[2])
+        assert events == tuple(events) != events[1:]
+        assert [each.start for each in segments[1:3]] == [segments[1].start, segments[2].start]
+        assert segments[-1].end == list(segments)[-1].end == run.t_end
+        for found in (events, segments):
             with pytest.raises(IndexError):
                 found[len(found)]
 
@@ -157,4 +158,4 @@ class TestLazyResults:
         event, segment = run.events[1], run.segments[1]
         assert type(event.time) is type(event.impulse) is type(event.loss.impact) is float
         assert type(segment.start) is type(segment.end) is type(segment.armed_at) is float
-        assert segment.flow.coefficients.dtype == complex
+        assert segment.rows.dtype == complex

@@ -8,7 +8,6 @@ from small_structures import chain, stop
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.time.record import Record
-from multiphi_exudyn.time.segments import as_segments
 from multiphi_exudyn.time.simulate import Run
 
 pytestmark = pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
@@ -46,7 +45,7 @@ def sizes(run):
 
 def recorded(run, end):
     """The same from the record."""
-    square, energy = as_segments(run.segments).sizes(end)
+    square, energy = run.segments.sizes(end)
     return square, 0.0 if run.ending.record.trajectory.truncation.is_isolated else energy
 
 

@@ -20,4 +20,4 @@ def test_bytes_of_an_event(modes, driven, asked):
     assert events > 15_000
     assert run.stats.record_bytes <= asked * events
     run.ledger, run.events.table(), run.at("m0", 50.0)
-    assert run.segments._record.bytes == run.stats.record_bytes
+    assert run.segments.trajectory.memory == run.stats.record_bytes

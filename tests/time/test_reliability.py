@@ -405,8 +405,8 @@ def test_what_the_loop_adds_up_of_defects_is_the_sum_of_them(kind):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             run = mp.simulate(model, 10.0, velocity=random.normal(size=model.structure.n))
-        sums, rows = run.segments, event_table(run.events, model.index)
-        assert_allclose(sums.truncated, np.sum(np.abs(rows[:, 3])), rtol=1e-12, atol=1e-300)
+        sums, rows = run.segments.truncation, event_table(run.events, model.index)
+        assert_allclose(sums.truncated_energy, np.sum(np.abs(rows[:, 3])), rtol=1e-12, atol=1e-300)
         if not (model.whole or math.isnan(sums.defects)):
             exact = sum(defect.size**2 for defect in defects(run))
             assert_allclose(sums.defects, exact, rtol=1e-6, atol=1e-24)

@@ -10,7 +10,6 @@ from small_structures import chain
 
 import multiphi_exudyn as mp
 import multiphi_exudyn._core as core
-from multiphi_exudyn.time import segments as segment
 from multiphi_exudyn.time.simulate import Run
 
 STOPS = (mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0))
@@ -37,7 +36,7 @@ def each(run, places, after, derivative):
 
 def assert_states_of_segments(run):
     """At the start, the end and five times between of every segment, segments in no order."""
-    own = segment.as_segments(run.segments)
+    own = run.segments
     places = np.random.default_rng(1).permutation(np.repeat(np.arange(len(own)), 7))
     after = (own.ends - own.starts)[places] * np.random.default_rng(2).choice(np.linspace(0, 1, 7), len(places))
     found = own.states(places, after)
@@ -65,13 +64,12 @@ def test_states_of_many_segments_together_are_those_of_each(loads, damping):
 def test_the_sizes_of_a_motion_are_those_of_its_displacements_and_energies(loads):
     """By the core, by single segments, and by the displacements of the structure in the norm of its mass."""
     run = mp.simulate(model(mp.ModalDamping([0.02, 0.01, 0.03])), 5.0, displacement=START, loads=loads)
-    found = segment.as_segments(run.segments).sizes(4.9)
+    found = run.segments.sizes(4.9)
     times = np.linspace(0.0, 4.9, core.MOTION_SAMPLES)
     x = run.displacement(times)
     squares = np.sum(x * (run.model.structure.mass @ x), axis=0)
     expected = np.mean(squares[1:] + squares[:-1]) / 2, np.max(np.abs(run.energy(times)))
     assert found == pytest.approx(expected, rel=1e-12)
-    assert segment.SegmentList(tuple(run.segments)).sizes(4.9) == pytest.approx(found, rel=1e-12)
 
 
 def test_pieces_of_a_harmonic_so_short_that_it_is_a_polynomial_there():
@@ -111,7 +109,7 @@ class TestPlacesGapsAndForces:
 
     @pytest.mark.parametrize("times", GRIDS.values(), ids=GRIDS)
     def test_are_those_of_each_segment(self, run, times):
-        own = segment.as_segments(run.segments)
+        own = run.segments
         places = own.owners(times)
         expected = [(run.segments[i], np.array([t])) for i, t in zip(places, times, strict=True)]
         vector = run.model.base.modes.shapes.T @ run.model.structure.row("m1")
@@ -126,8 +124,8 @@ class TestPlacesGapsAndForces:
         times = np.array([event.time for event in run.events])
         right, left = (run.contact_force("below", times, side) for side in ("right", "left"))
         for k, t in enumerate(times):
-            after = run.segments[int(np.flatnonzero(segment.as_segments(run.segments).starts <= t)[-1])]
-            before = run.segments[int(np.flatnonzero(segment.as_segments(run.segments).starts < t)[-1])]
+            after = run.segments[int(np.flatnonzero(run.segments.starts <= t)[-1])]
+            before = run.segments[int(np.flatnonzero(run.segments.starts < t)[-1])]
             assert right[k] == pytest.approx(after.force(0, times[k : k + 1])[0], abs=1e-10)
             assert left[k] == pytest.approx(before.force(0, times[k : k + 1])[0], abs=1e-10)
 
@@ -139,7 +137,7 @@ class TestWhateverHappensToTheRun:
 
     @staticmethod
     def asked(run):
-        own = segment.as_segments(run.segments)
+        own = run.segments
         times = np.linspace(0.0, run.t_end, 50)
         places = own.owners(times)
         return own.states(places, times - own.starts[places])

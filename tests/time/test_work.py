@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from quadrature import works_by_quadrature
 from small_structures import chain, oscillator
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.time.segments import SegmentList, as_segments
 from multiphi_exudyn.time.simulate import Run
 
 COMPLIANT = (mp.UnilateralContact("below", "m2", 0.1, 50.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.15, 30.0))
@@ -47,9 +47,10 @@ def run_of(damping, contacts, loads, t_end=5.0, start=(0.03, 0.06, -0.09)):
 
 
 def assert_works_of_segments(run):
-    """Of those that the loop has summed, and all integrated afterwards."""
-    found, expected = as_segments(run.segments).works, SegmentList(tuple(run.segments)).works
-    integrated = run.segments._record.works(np.arange(len(run.segments)))
+    """Of those that the run has summed, and all integrated afterwards."""
+    found, expected = run.segments.works, works_by_quadrature(run)
+    afterwards = run.segments._sampler.works(list(range(len(run.segments))))
+    integrated = afterwards.damping, afterwards.varying, afterwards.friction
     size = np.max(np.abs(run.energy(np.linspace(0, run.t_end, 101)))) + abs(expected[1])
     assert_allclose(found, expected, rtol=0, atol=1e-12 * size)
     assert_allclose(integrated, expected, rtol=0, atol=1e-12 * size)
@@ -78,7 +79,7 @@ def test_works_of_moving_stops_are_those_of_each_segment(elements, damping):
 def test_samples_take_no_more_terms_than_a_straight_line_has():
     """Two, and those of the free response: no series in powers of time."""
     run = run_of(DAMPINGS["coupled"], COMPLIANT, LOADS["samples"], t_end=3.97)
-    assert len(run.segments[-1].flow.basis.rates) == 3 + 2
+    assert len(run.segments[-1].basis.rates) == 3 + 2
     assert_works_of_segments(run)
 
 
@@ -132,13 +133,13 @@ def test_a_run_without_modes_does_no_work():
 @pytest.mark.parametrize("loads", [name for name in LOADS if name != "function"])
 def test_the_loop_sums_the_works_of_all_segments_under_the_usual_loads(loads, elements):
     run = run_of(DAMPINGS["coupled"], elements, LOADS[loads])
-    assert len(run.segments._record.left_out) == 0
+    assert len(run.segments.left_out) == 0
 
 
 def test_segments_at_resonance_are_left_out_and_integrated_when_asked_for():
     omega = float(mp.MultiPhiModel(chain(3, stiffness=10.0), [], modes="all").level(()).omega[1])
     run = run_of(DAMPINGS["none"], COMPLIANT, [mp.HarmonicLoad("m1", 2.0, omega / (2 * math.pi))])
-    assert len(run.segments._record.left_out) > 0
+    assert len(run.segments.left_out) > 0
     assert_works_of_segments(run)
 
 
@@ -151,7 +152,7 @@ def test_a_run_asked_on_the_way_keeps_its_ledger_when_it_goes_on():
         motion.advance(3.0)
         late = motion.trajectory(3.0)
         for run in (late, early):
-            assert_allclose(run.segments.works, SegmentList(tuple(run.segments)).works, rtol=0, atol=1e-12)
+            assert_allclose(run.segments.works, works_by_quadrature(run), rtol=0, atol=1e-12)
             assert abs(run.ledger.residual) < 1e-12
 
 

@@ -15,7 +15,6 @@ void bind_run(nanobind::module_& module);
 void bind_sampler(nanobind::module_& module);
 void bind_search(nanobind::module_& module);
 void bind_splitting(nanobind::module_& module);
-void bind_start_projection(nanobind::module_& module);
 void bind_step_test(nanobind::module_& module);
 void bind_response(nanobind::module_& module);
 void bind_work(nanobind::module_& module);

@@ -10,7 +10,6 @@ NB_MODULE(_core, module) {
     multiphi::bindings::bind_level_modes(module);
     multiphi::bindings::bind_orthonormal(module);
     multiphi::bindings::bind_complementarity(module);
-    multiphi::bindings::bind_start_projection(module);
     multiphi::bindings::bind_search(module);
     multiphi::bindings::bind_run(module);
     multiphi::bindings::bind_sampler(module);

@@ -311,19 +311,6 @@ void bind_run(nb::module_& module) {
         },
         "levels"_a, "starts"_a, "window"_a, "allowed"_a, "time"_a, "end"_a, "threads"_a,
         "Runs from many starts on several threads.");
-    module.def(
-        "sample_batch",
-        [](const std::shared_ptr<Levels>& levels, const std::vector<std::shared_ptr<Trajectory>>& trajectories,
-           const std::map<Key, Matrix>& rows, const std::vector<double>& times, int threads) {
-            std::vector<double> values;
-            {
-                const nb::gil_scoped_release released;
-                values = sample_batch(levels, trajectories, rows, times, threads);
-            }
-            return Vector(Vector::Map(values.data(), static_cast<Index>(values.size())));
-        },
-        "levels"_a, "trajectories"_a, "rows"_a, "times"_a, "threads"_a,
-        "Displacements (runs, points, times) of points; rows: of (xi, xi', 1) of all points, by the levels' keys.");
 }
 
 }  // namespace multiphi::bindings

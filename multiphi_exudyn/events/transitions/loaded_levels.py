@@ -21,8 +21,6 @@ from multiphi_exudyn.mathematics.round_off import power_of_two_above
 
 __all__ = ["LoadedLevels"]
 
-STARTS_KEPT = 4  # ends of runs for which the values that judge starts are kept
-WARNINGS_KEPT = 16  # sets of warnings that are kept
 DERIVED_KEPT = 8  # derived values of a level: two step sizes of a solver, attachments at two positions
 
 T = TypeVar("T")
@@ -46,8 +44,7 @@ class LoadedLevels:
     The key of a level is the state numbers of all elements. alone: the levels under the static loads alone, with held
     displacements as channels, which are kept longer than a run; it is these levels if nothing varies. lasting: the
     longest duration [s] of a motion. core: the core's levels, for later runs (time/core_levels.py). held:
-    the same under forces that bodies hold for a step (exact_motion.py). starts: values by which starts are judged, by
-    the end [s] of their run (simulate.py). told: warnings common to runs in the same levels (run_warnings.py).
+    the same under forces that bodies hold for a step.
     """
 
     def __init__(
@@ -66,14 +63,11 @@ class LoadedLevels:
         self.set_interval(time, until)
         self.core: Any = None
         self.held: Any = None
-        self.starts = BoundedCache[float, Any](STARTS_KEPT)
-        self.told = BoundedCache[Hashable, Any](WARNINGS_KEPT)
         self._entries = BoundedCache[tuple[int, ...], _LevelEntry](model.most_levels)
         self._pushed = BoundedCache[tuple[int, ...], LoadedLevel](model.most_levels)
 
     def __getstate__(self) -> dict[str, Any]:
-        starts = BoundedCache[float, Any](STARTS_KEPT)
-        return {**vars(self), "core": None, "held": None, "starts": starts}  # a copy makes its own
+        return {**vars(self), "core": None, "held": None}  # a copy makes its own
 
     @classmethod
     def static(cls, model: MultiPhiModel, load: np.ndarray, lasting: float = math.inf) -> LoadedLevels:

@@ -43,7 +43,6 @@ from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
 from multiphi_exudyn.mechanics.structure import damping_matrix
 from multiphi_exudyn.mechanics.time_functions import Harmonic
 from multiphi_exudyn.study.stability.given_motions import approximated, forces_at, stop_motion
-from multiphi_exudyn.time.segments import as_segments
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["broken_laws"]
@@ -189,7 +188,7 @@ class _Run:
     @cached_property
     def bounds(self) -> np.ndarray:
         """Starts and ends (s + 1,) of the segments [s]."""
-        return np.append(as_segments(self.trajectory.segments).starts, self.trajectory.t_end)
+        return np.append(self.trajectory.segments.starts, self.trajectory.t_end)
 
     @cached_property
     def instants(self) -> np.ndarray:

@@ -18,7 +18,7 @@ from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.study.stability.run_signals import Signal
 from multiphi_exudyn.time.ledger import Ledger
-from multiphi_exudyn.time.segments import Segment, as_segments
+from multiphi_exudyn.time.segments import Segment
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["complaints", "ends_of", "energy_rise", "largest_energy", "missed", "still"]
@@ -94,7 +94,7 @@ def largest_energy(run: Trajectory, segments: Sequence[Segment], joule: float = 
     passed = PASSED * abs(run.model.level(()).asymptotic(run.load).potential)
     passed = max(passed, PASSED * max((abs(event.loss.truncation_strain) for event in run.events), default=0.0))
     passed = max(passed, PASSED * _stretched(run), PASSED * max(_summed(run, segment) for segment in segments))
-    entered = [run.segments[first] for first in np.unique(as_segments(run.segments).numbers, return_index=True)[1]]
+    entered = [run.segments[first] for first in np.unique(run.segments.numbers, return_index=True)[1]]
     passed = max(passed, PASSED * max(map(_potential_terms, entered)))
     return max(ledger.initial, abs(ledger.work_of_loads), float(stored), float(work), SMALLEST * joule, rests, passed)
 
