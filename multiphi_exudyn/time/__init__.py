@@ -4,6 +4,6 @@ A motion advances a state, segment by segment, in the core, under loads that are
 keeps the segments and events of the core; a trajectory samples them, and sums the works that the core has left out. The
 effect of truncation and the warnings of a run are computed from its trajectory.
 
-Order: core_levels, segments, record, model_warnings, start, ledger, histories, saved, trajectory, motion, continuation,
-law_warnings, contact_warnings, truncation, run_warnings, simulate, many.
+Order: core_levels, segments, record, model_warnings, start, ledger, histories, saved, mesh_output, trajectory, motion,
+continuation, law_warnings, contact_warnings, truncation, run_warnings, simulate, many.
 """

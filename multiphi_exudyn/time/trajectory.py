@@ -16,7 +16,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.histories import INSTANTS, Histories
 from multiphi_exudyn.time.ledger import FinalState, Ledger, Statistics, ledger_of
+from multiphi_exudyn.time.mesh_output import write_vtu
 from multiphi_exudyn.time.model_warnings import issue, row_warnings
 from multiphi_exudyn.time.saved import save
 from multiphi_exudyn.time.segments import Segments, force_row, gap_row, patch_row, point_row, pressing_row
@@ -49,6 +50,7 @@ ROWS = {  # of a level, for an element's position
 PERTURBATION = 1e-12  # of the largest velocity: above round-off, below the accuracy of a start
 GAP_CHANGE = 1e-10  # of a gap and of the motion there: above what counts as one instant where stops move
 STILL = 1e-6  # of the smallest gap: a smaller motion is none, and distances are judged by the gap
+FRAMES = 101  # of mesh output where no times are given
 SEED = 1  # of the directions of perturbations
 Rerun: TypeAlias = "Callable[[np.ndarray, np.ndarray, Mapping[str, float]], Trajectory]"
 
@@ -127,8 +129,8 @@ class Trajectory(ModelHistories):
 
     Histories: ``displacement``, ``velocity``, ``acceleration``, ``at`` a point, ``gap``, ``contact_force``,
     ``contact_impulse``, ``contact_intervals``, ``friction_force``, ``slip``, ``stick_intervals``, ``energy``; a table
-    by ``to_dataframe``, a figure by ``plot``. Times [s] are scalars or (k,); at an event ``side`` chooses the
-    limit from the "right" (default) or the "left".
+    by ``to_dataframe``, a figure by ``plot``, files for ParaView by ``to_vtu``. Times [s] are scalars or (k,); at an
+    event ``side`` chooses the limit from the "right" (default) or the "left".
 
     Attributes
     ----------
@@ -221,6 +223,38 @@ class Trajectory(ModelHistories):
     def stats(self) -> Statistics:
         """Levels built, transitions, events, segments, function evaluations, bytes."""
         return self.ending.statistics(len(self.segments), len(self.events), self.model.levels_possible)
+
+    def to_vtu(self, path: str | Path, mesh: Any, dofs: np.ndarray, times: np.ndarray | None = None) -> list[Path]:
+        """Write the motion on a mesh: a VTU file for each time, and a PVD file that lists them, as ParaView opens it.
+
+        Every node has its displacement [m], its velocity [m/s] and the force of contacts and friction [N]. Needs
+        meshio, the extra "mesh".
+
+        Parameters
+        ----------
+        path : str or Path
+            Name of the PVD file; the others stand beside it.
+        mesh : meshio.Mesh or array (p, 1 to 3)
+            Nodes [m] and cells, or nodes alone.
+        dofs : array (p, 1 to 3)
+            Degrees of freedom of the displacements of every node, in the numbering without supports, -1 for none.
+        times : array (k,), default None
+            Times [s], None for 101 that are evenly spaced.
+
+        Returns
+        -------
+        list of Path
+            What was written, the PVD file first.
+
+        Raises
+        ------
+        MultiPhiError
+            Without meshio.
+        MultiPhiTypeError, MultiPhiValueError
+            For a mesh or degrees of freedom of another shape, and a time outside of the motion.
+        """
+        at = self._times(np.linspace(self.t_start, self.t_end, FRAMES) if times is None else times)
+        return write_vtu(self, path, mesh, dofs, at)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion to an .npz file without pickled objects, which ``load_trajectory`` reads.

@@ -164,6 +164,17 @@ def test_meshed_cantilever(capsys, tmp_path):
     assert picture.stat().st_size > 10_000
 
 
+def test_plate_on_many_stops(capsys, tmp_path):
+    costs = load("plate_on_many_stops").main([str(tmp_path / "plate.pvd")])
+    own, residual = (cost.trajectory for cost in costs.values())
+    assert own.status == residual.status == "ok"
+    assert len(own.events) == len(residual.events) > 20
+    times = np.linspace(0, 0.1, 101)
+    assert np.abs(own.at("tip", times) - residual.at("tip", times)).max() < 1e-4 * np.abs(own.at("tip", times)).max()
+    assert len(list(tmp_path.glob("*.vtu"))) == 101
+    assert "for ParaView" in capsys.readouterr().out
+
+
 def test_draw_body(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(exu.config, "printToConsole", False)

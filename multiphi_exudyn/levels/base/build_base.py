@@ -51,7 +51,7 @@ def build_base(
     else:
         first = np.array(parallel(rows.T), int)
         distinct = np.unique(first)
-        stiffness = np.array([_largest_stiffness(contacts, np.flatnonzero(first == index)) for index in distinct])
+        stiffness = _largest_stiffnesses(contacts, first)[distinct]
         shown = np.vstack([rows[distinct], points, load_rows])
         krylov_rows = shown[sorted(set(parallel(shown.T)))]  # the distinct rows of contacts come first
         own = [place for place, link in enumerate(distinct.tolist()) if not isinstance(links[link], ResidualContact)]
@@ -95,15 +95,19 @@ def _sample_levels(own: Sequence[int], stiffness: np.ndarray, modes: int) -> lis
     return [HeldRows(rows, stiffness[rows], modes) for rows in row_sets]
 
 
-def _largest_stiffness(contacts: Sequence[Element], same: np.ndarray) -> float:
-    """Return the largest stiffness [N/m] of an element in one of its states along the direction of links ``same``."""
-    links, places = links_of(contacts), link_indices(contacts)
-    stiffnesses = [
-        sum(links[indices[k]].stiffness for k in state.holds if indices[k] in same)
-        for element, indices in zip(contacts, places, strict=True)
-        for state in element.states
-    ]
-    return max(*stiffnesses, 0.0)
+def _largest_stiffnesses(contacts: Sequence[Element], first: np.ndarray) -> np.ndarray:
+    """Return the largest stiffness (l,) [N/m] of an element in one of its states along each direction.
+
+    first: for every link the first one of its direction, at whose place the stiffness is.
+    """
+    links, largest = links_of(contacts), np.zeros(len(first))
+    for element, indices in zip(contacts, link_indices(contacts), strict=True):
+        for state in element.states:
+            together = np.zeros(len(first))
+            for k in state.holds:
+                together[first[indices[k]]] += links[indices[k]].stiffness
+            largest = np.maximum(largest, together)
+    return largest
 
 
 def _force_row(structure: LinearStructure, link: AnyLink) -> np.ndarray:
