@@ -189,7 +189,10 @@ Eigenpairs eigenpairs(const Matrix& system) {
 Schur complex_schur(const Matrix& system) {
     if (system.rows() == 0) return {};
     const Balanced balanced(system);
-    const Eigen::ComplexSchur<Eigen::MatrixXcd> solver(balanced.matrix().cast<Complex>());
+    const Eigen::HessenbergDecomposition<Eigen::MatrixXd> hessenberg(balanced.matrix());
+    const Eigen::MatrixXd reduced_matrix = hessenberg.matrixH(), reduction = hessenberg.matrixQ();  // real, as A is
+    Eigen::ComplexSchur<Eigen::MatrixXcd> solver(system.rows());
+    solver.computeFromHessenberg(reduced_matrix.cast<Complex>(), reduction.cast<Complex>());
     if (solver.info() != Eigen::Success) throw NumericalFailure(Cause::indistinct_modes);
     Schur result{solver.matrixT(), solver.matrixU()};
     balanced.undo(result.basis);
@@ -207,7 +210,7 @@ void Schur::bring_forward(const std::vector<int>& places) {
 double condition(const Matrix& matrix) {
     if (!matrix.allFinite()) return std::numeric_limits<double>::infinity();
     if (matrix.size() == 0) return 1.0;
-    const Vector values = Eigen::BDCSVD<Eigen::MatrixXd>(matrix).singularValues();
+    const Vector values = Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::NoQRPreconditioner>(matrix).singularValues();
     return values[values.size() - 1] > 0.0 ? values[0] / values[values.size() - 1]
                                            : std::numeric_limits<double>::infinity();
 }
