@@ -22,9 +22,9 @@ import scipy.interpolate
 import scipy.signal
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.study.accuracy.cases import load_study
-from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study.runners import run_model
 from multiphi_exudyn.study.setup import Setup, prepare
+from multiphi_exudyn.study.study_file import load_study
 
 STUDIES = {  # and what their values are
     "clamp": "rotation [N m/rad]",

@@ -4,7 +4,7 @@
                     | studies
 
 Exit code 0 if every requested model ran, 1 if one failed, 2 for bad input, with one line on stderr. For a study: 0 if
-all references and budgets, and at least one setting of every method, ran; failed settings are rows with their cause.
+all references, and at least one setting of every method, ran; failed settings are rows with their cause.
 For validate: 0 if the file is valid. For stability: 0 if no case is wrong.
 
 A command imports what it needs when it runs, so that ``--help`` is fast.
@@ -28,8 +28,8 @@ from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.version import __version__
 
 if TYPE_CHECKING:
-    from multiphi_exudyn.study.accuracy.study_result import StudyResult
-    from multiphi_exudyn.study.comparison.compare import Comparison
+    from multiphi_exudyn.study.accuracy import StudyResult
+    from multiphi_exudyn.study.compare import Comparison
 
 __all__ = ["command", "main", "parser"]
 
@@ -247,11 +247,10 @@ def _compare(options: Options) -> bool:
     import numpy as np
     from tqdm import tqdm
 
-    from multiphi_exudyn.study.comparison.compare import compare, histories, summary
-    from multiphi_exudyn.study.comparison.losses import loss_tables
-    from multiphi_exudyn.study.comparison.mode_shapes import level_modes
-    from multiphi_exudyn.study.comparison.report import render
-    from multiphi_exudyn.study.running.environment import environment, import_times
+    from multiphi_exudyn.study.compare import compare, histories, summary
+    from multiphi_exudyn.study.details import details_of
+    from multiphi_exudyn.study.report import render
+    from multiphi_exudyn.study.runs import environment, import_times
     from multiphi_exudyn.study.scene import load_scene
     from multiphi_exudyn.study.setup import prepare
 
@@ -271,7 +270,7 @@ def _compare(options: Options) -> bool:
         arrays = io.BytesIO()
         np.savez_compressed(arrays, allow_pickle=False, **dict[str, Any](histories(comparison)))
         content = json.dumps(summary(comparison), indent=1, allow_nan=False)
-        page = render(comparison, level_modes(comparison), loss_tables(setup))
+        page = render(comparison, details_of(comparison))
         write_whole(folder / "histories.npz", arrays.getvalue())
         write_whole(folder / "summary.json", content.encode())
         write_whole(folder / "report.html", page.encode())
@@ -281,8 +280,8 @@ def _compare(options: Options) -> bool:
 
 
 def _print_comparison(comparison: Comparison, folder: Path) -> None:
-    from multiphi_exudyn.study.comparison.findings import comparison_warnings, findings
-    from multiphi_exudyn.study.comparison.wording import percent, seconds, times
+    from multiphi_exudyn.study.report import comparison_warnings, findings
+    from multiphi_exudyn.study.wording import percent, seconds, times
 
     until = comparison.headline_window
     width = max(map(len, comparison.runs))
@@ -304,7 +303,7 @@ def _animate(options: Options) -> bool:
     """Write the GIF; True if both models ran, else False without a file."""
     from tqdm import tqdm
 
-    from multiphi_exudyn.study.comparison.animation import gif, prepare_animation
+    from multiphi_exudyn.study.animation import gif, prepare_animation
     from multiphi_exudyn.study.scene import load_scene
     from multiphi_exudyn.time.model_warnings import grouped
 
@@ -331,25 +330,24 @@ def _animate(options: Options) -> bool:
 
 def _budget(options: Options) -> bool:
     """Write budget.json and budget.png; True if none of the models failed."""
-    from multiphi_exudyn.study.accuracy.budget import budget
-    from multiphi_exudyn.study.accuracy.budget_figure import budget_figure
-    from multiphi_exudyn.study.comparison.figure_style import png
+    from multiphi_exudyn.study.budget import budget, budget_figure
+    from multiphi_exudyn.study.plots import png
     from multiphi_exudyn.study.scene import load_scene
     from multiphi_exudyn.study.setup import prepare
 
     scene = load_scene(options.scene, t_end=options.t_end, modes=options.modes)
     setup = prepare(scene)
     folder = _folder(options.out or Path(f"multiphi-{scene.name}"))
-    values = budget(setup, scene.file.modes, progress=sys.stderr.isatty()).values()
+    values = budget(setup, scene.file.modes, progress=sys.stderr.isatty())
     write_whole(folder / "budget.json", json.dumps(values, indent=1).encode())
-    write_whole(folder / "budget.png", png(budget_figure([values])))
+    write_whole(folder / "budget.png", png(budget_figure(values)))
     _print_budget(values)
     print(f"\n{folder / 'budget.png'}")
     return all(rung["status"] == "ok" for rung in values["rungs"].values())
 
 
 def _print_budget(values: dict[str, Any]) -> None:
-    from multiphi_exudyn.study.comparison.wording import percent
+    from multiphi_exudyn.study.wording import percent
     from multiphi_exudyn.time.model_warnings import grouped
 
     for name, rung in values["rungs"].items():
@@ -376,7 +374,7 @@ def _needs(options: Options) -> bool:
     """Print a line for every scene, or for all shipped scenes without a name; True if all ran."""
     from tqdm import tqdm
 
-    from multiphi_exudyn.study.running.needs import needs_of, needs_table
+    from multiphi_exudyn.study.needs import needs_of, needs_table
     from multiphi_exudyn.study.scene import load_scene, shipped_scenes
     from multiphi_exudyn.time.model_warnings import grouped
 
@@ -392,12 +390,11 @@ def _needs(options: Options) -> bool:
 
 
 def _study(options: Options) -> bool:
-    """Run or continue a study in its folder; True if all references, all budgets and a setting of every method ran."""
-    from multiphi_exudyn.study.accuracy.cases import load_study
-    from multiphi_exudyn.study.accuracy.study import run_study
-    from multiphi_exudyn.study.accuracy.study_report import render_study
-    from multiphi_exudyn.study.accuracy.study_result import csv_text
+    """Run or continue a study in its folder; True if all references and a setting of every method ran."""
+    from multiphi_exudyn.study.accuracy import csv_text, run_study
+    from multiphi_exudyn.study.accuracy_report import render_study
     from multiphi_exudyn.study.results import TABLE
+    from multiphi_exudyn.study.study_file import load_study
     from multiphi_exudyn.study.sweep import Store, open_executor
 
     study = load_study(options.study, quick=options.quick)
@@ -409,15 +406,14 @@ def _study(options: Options) -> bool:
     _print_study(result, folder)
     ran = {row.parameters["method"] for row in result.rows if row.status == "ok"}
     references = all(row.status == "ok" for row in result.rows if row.parameters["method"] == "reference")
-    budgets = all(row.status == "ok" for row in result.budgets)
-    return references and budgets and {method.name for method in result.study.methods} <= ran
+    return references and {method.name for method in result.study.methods} <= ran
 
 
 def _print_study(result: StudyResult, folder: Path) -> None:
     """The cheapest setting of every method for every tolerance, at its worst point of the axes; untimed, errors."""
-    from multiphi_exudyn.study.accuracy.analysis import cheapest, points, words
-    from multiphi_exudyn.study.accuracy.study_findings import findings, records, study_warnings
-    from multiphi_exudyn.study.comparison.wording import percent, seconds, share, times
+    from multiphi_exudyn.study.accuracy import cheapest, points, words
+    from multiphi_exudyn.study.accuracy_report import findings, records, study_warnings
+    from multiphi_exudyn.study.wording import percent, seconds, share, times
 
     places = points(result) if result.rows else [{}]
     several = len(places) > 1
@@ -434,18 +430,17 @@ def _print_study(result: StudyResult, folder: Path) -> None:
             print(f"  {best['method']:32}  {numbers}  {words(best['setting'])}{worst}")
     if not result.timings:
         print("", *findings(result)["outcome"], sep="\n")
-    rows = result.rows + result.budgets
-    failed = sum(row.status != "ok" for row in rows)
+    failed = sum(row.status != "ok" for row in result.rows)
     for sentence in study_warnings(result):
         print(f"warning: {sentence}")
-    print(f"\n{len(rows)} runs, {failed} without an answer\n{folder / 'report.html'}")
+    print(f"\n{len(result.rows)} runs, {failed} without an answer\n{folder / 'report.html'}")
 
 
 def _stability(options: Options) -> bool:
     """Run the catalogue or one case, write report.html, summary.json and table.txt; True if no case is wrong."""
     from tqdm import tqdm
 
-    from multiphi_exudyn.study.running.environment import environment
+    from multiphi_exudyn.study.runs import environment
     from multiphi_exudyn.study.stability.catalogue_run import FULL_LENGTH, QUICK, chosen_cases, run_case
     from multiphi_exudyn.study.stability.report import render_stability, text_table
     from multiphi_exudyn.study.stability.summary import contents
@@ -492,15 +487,15 @@ def _write_template(kind: str, path: Path) -> None:
 
 def _validate(options: Options) -> bool:
     """Check a scene or a study without a run, from a file or shipped, and print a summary of it."""
-    from multiphi_exudyn.study.accuracy.cases import load_study, shipped_studies
     from multiphi_exudyn.study.scene import load_scene, read_toml
     from multiphi_exudyn.study.setup import prepare
+    from multiphi_exudyn.study.study_file import load_study, shipped_studies
 
     source = options.file
     if source in shipped_studies() or (Path(source).is_file() and "scene" in read_toml(Path(source))):
         study = load_study(source)
         axes = " x ".join(f"{len(values)} of {axis}" for axis, values in study.file.axes.items()) or "no axes"
-        runs = len(study.budgets()) + sum(1 + len(study.runs(at)) for at in study.points if study.file.methods)
+        runs = sum(1 + len(study.runs(at)) for at in study.points)
         print(f"{source}: valid, a study of {len(study.points)} points ({axes}), {runs} runs")
         return True
     setup = prepare(load_scene(source))
@@ -513,8 +508,8 @@ def _validate(options: Options) -> bool:
 
 def _schema(options: Options) -> bool:
     """Print the JSON schema of a file, for editors."""
-    from multiphi_exudyn.study.accuracy.study_file import StudyFile
     from multiphi_exudyn.study.scene import SceneFile
+    from multiphi_exudyn.study.study_file import StudyFile
 
     schema = json.dumps((SceneFile if options.kind == "scene" else StudyFile).model_json_schema())
     print(json.dumps(json.loads(schema, parse_constant=lambda infinite: "rigid"), indent=1))
@@ -528,7 +523,7 @@ def _scenes(options: Options) -> bool:
 
 
 def _studies(options: Options) -> bool:
-    from multiphi_exudyn.study.accuracy.cases import shipped_studies
+    from multiphi_exudyn.study.study_file import shipped_studies
 
     return _print_titles(shipped_studies())
 

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import settings
 
 from multiphi_exudyn.errors import MultiPhiError
-from multiphi_exudyn.study.comparison import figure_style
-from multiphi_exudyn.study.running import runner, timing
+from multiphi_exudyn.study import plots, runners
+from multiphi_exudyn.study import runs as timing
 from reference_models.exudyn_quiet import quiet
 
 settings.register_profile("deterministic", derandomize=True, deadline=None)
@@ -28,27 +28,27 @@ def pytest_configure(config: pytest.Config) -> None:
 def short_timing() -> Iterator[None]:
     """Runs are repeated once, and not until their time is steady: nobody looks at it.
 
-    Who does sets ``runner.repeated`` back to ``timing.repeated``.
+    Who does sets ``runners.repeated`` back to ``runs.repeated``.
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(timing, "STEADY_S", 0.0)
-        patch.setattr(runner, "repeated", lambda run, first, fewest: timing.repeated(run, first, min(fewest, 1)))
+        patch.setattr(runners, "repeated", lambda run, first, fewest: timing.repeated(run, first, min(fewest, 1)))
         yield
 
 
 @pytest.fixture(scope="session", autouse=True)
 def pictures() -> Iterator[Callable[[], AbstractContextManager[None]]]:
     """Pages hold no pictures, at which nobody looks, but those made ``with pictures():``."""
-    draw = figure_style.png
+    draw = plots.png
 
     @contextmanager
     def drawn() -> Iterator[None]:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(figure_style, "png", draw)
+            patch.setattr(plots, "png", draw)
             yield
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(figure_style, "png", lambda figure: b"")
+        patch.setattr(plots, "png", lambda figure: b"")
         yield drawn
 
 

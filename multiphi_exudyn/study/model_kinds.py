@@ -1,7 +1,7 @@
 """The tables ``[[models]]`` of a scene file: one class for each kind of model, and the scenes that it takes.
 
 ``faults`` says what of a scene a kind cannot have, before anything runs. How a kind runs, and its label, is in its
-runner (multiphi_exudyn.study.running). A new kind needs a class here, an entry in ``ModelSpec``, and a runner.
+runner (runners.py). A new kind needs a class here, an entry in ``ModelSpec``, and a runner.
 """
 
 from __future__ import annotations
@@ -109,6 +109,7 @@ class ReducedModel(_Levels):
     kind: Literal["reduced"]
     modes: Modes | None = None  # none given: the scene's
     tolerance: Positive | None = None  # truncation error wanted, from which the modes follow, in place of a number
+    boundary: Literal["own", "residual"] | None = None  # modes of each level, or one basis with residual flexibility
 
     @model_validator(mode="after")
     def _one_choice_of_modes(self) -> ReducedModel:

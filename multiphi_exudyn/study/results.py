@@ -43,7 +43,7 @@ def load(folder: str | Path) -> pd.DataFrame:
     - of the timing pass ``timing.online_s`` the median, ``timing.first_s``, ``timing.offline_s``, ``timing.repeats_s``;
       ``turns.online_s``, ``turns.repeats_s`` of settings near the cheapest, timed in turns:
       the lower quartile, and the times of all rounds [s]
-    - ``budget.NAME``: the parts of an error budget; ``elapsed_s``, ``finished``
+    - ``elapsed_s``, ``finished``
 
     How the numbers are defined stands at the end of the study's report. For instance, the largest force by gap and
     stiffness::

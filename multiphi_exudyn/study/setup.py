@@ -146,7 +146,8 @@ class Setup:
         """The reduced model of a scene's entry."""
         tolerance = getattr(spec, "tolerance", None)
         modes = (spec.modes or "all") if tolerance is None else Tolerance(tolerance)
-        return MultiPhiModel(self.structure, self.nonlinearities(spec.rigid), modes=modes, overrides=self.overrides)
+        elements, boundary = self.nonlinearities(spec.rigid), getattr(spec, "boundary", None)
+        return MultiPhiModel(self.structure, elements, modes=modes, overrides=self.overrides, boundary=boundary)
 
     def full_beam(self, spec: FullModel) -> FullBeam:
         """The full model of a scene's entry."""

@@ -48,7 +48,7 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.study.running.environment import machine
+from multiphi_exudyn.study.runs import machine
 from multiphi_exudyn.study.store import STATUSES, Row, Store, checked, key_of, pack, plain
 
 __all__ = ["Outcome", "Row", "Store", "TimeLimitExceeded", "call_within", "grid", "open_executor", "sweep"]

@@ -14,8 +14,8 @@ import multiphi_exudyn as mp
 from multiphi_exudyn import cli
 from multiphi_exudyn.cli import THREAD_SETTINGS, parser
 from multiphi_exudyn.files import write_whole
+from multiphi_exudyn.study import runners
 from multiphi_exudyn.study import setup as bench
-from multiphi_exudyn.study.running import reduced_runner
 from multiphi_exudyn.study.scene import shipped_scenes
 
 FILES = {"report.html", "histories.npz", "summary.json"}
@@ -25,7 +25,7 @@ FILES = {"report.html", "histories.npz", "summary.json"}
 def scene(tmp_path, monkeypatch):
     """A small scene's file, in an empty working directory, without the seconds that import_times() takes."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("multiphi_exudyn.study.running.environment.import_times", dict)
+    monkeypatch.setattr("multiphi_exudyn.study.runs.import_times", dict)
     monkeypatch.setattr(bench, "ELEMENTS", 16)
     return write(tmp_path / "small.toml", BEAM)
 
@@ -65,14 +65,14 @@ def test_modes_end_time_and_folder_are_taken_from_the_command_line(scene, tmp_pa
 
 
 def test_a_failed_model_is_exit_code_1_and_still_a_report(scene, tmp_path, monkeypatch, capsys):
-    simulate = reduced_runner.simulate
+    simulate = runners.simulate
 
     def failing(model, t_end, start, loads):
         if model.modes == 6:
             raise RuntimeError("did not converge\nat 0.02 s")
         return simulate(model, t_end, start=start)
 
-    monkeypatch.setattr(reduced_runner, "simulate", failing)
+    monkeypatch.setattr(runners, "simulate", failing)
     assert cli.main(["compare", scene]) == 1
     assert "did not converge at 0.02 s" in capsys.readouterr().out
     assert {path.name for path in (tmp_path / "multiphi-small").iterdir()} == FILES
@@ -91,7 +91,7 @@ def test_an_interrupted_comparison_leaves_no_file(scene, tmp_path, monkeypatch):
     def broken(comparison):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("multiphi_exudyn.study.comparison.compare.summary", broken)
+    monkeypatch.setattr("multiphi_exudyn.study.compare.summary", broken)
     assert cli.main(["compare", scene]) == 130
     assert list((tmp_path / "multiphi-small").iterdir()) == []
 

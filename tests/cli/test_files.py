@@ -7,7 +7,7 @@ from small_study import result_of, row
 
 from multiphi_exudyn import MultiPhiValueError, cli
 from multiphi_exudyn.study import load
-from multiphi_exudyn.study.accuracy.study_result import csv_text
+from multiphi_exudyn.study.accuracy import csv_text
 from multiphi_exudyn.study.scene import with_value
 
 

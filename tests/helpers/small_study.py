@@ -5,10 +5,11 @@ import json
 
 import numpy as np
 
-from multiphi_exudyn.study.accuracy.study_file import StudyFile
-from multiphi_exudyn.study.accuracy.study_result import MapPair, StudyResult
-from multiphi_exudyn.study.measures.spectra import wavelet_map
+from multiphi_exudyn.study.accuracy import StudyResult
+from multiphi_exudyn.study.details import MapPair
+from multiphi_exudyn.study.measures import wavelet_map
 from multiphi_exudyn.study.store import Row
+from multiphi_exudyn.study.study_file import StudyFile
 
 ENVIRONMENT = {
     "date": "2026-01-02T03:04:05+00:00",
@@ -89,7 +90,7 @@ def result_of(rows, timings=(), methods=METHODS, **changes):
     """A result of given rows."""
     study = StudyFile.model_validate({"title": "A <small> study", "scene": "small", "methods": methods}, strict=False)
     given = {"study": study, "name": "small", "judged_points": POINTS, "window": 0.3, "rows": tuple(rows)}
-    given |= {"timings": tuple(timings), "turns": (), "budgets": (), "maps": (), "environment": ENVIRONMENT}
+    given |= {"timings": tuple(timings), "turns": (), "maps": (), "environment": ENVIRONMENT}
     return StudyResult(**given | {"assumptions": ("The support is <stiff>.",), "quick": False} | changes)
 
 

@@ -143,7 +143,7 @@ BREACHES = {
     "itself": ("levels.level.level", "from multiphi_exudyn.levels.level.level import Level"),
     "its own room": ("levels.level.level", "import multiphi_exudyn.levels"),
     "the whole house": ("levels.level.level", "import multiphi_exudyn as mp"),
-    "a later room within one": ("study.scene_tables", "from multiphi_exudyn.study.running import runs"),
+    "a later room within one": ("study.scene_tables", "from multiphi_exudyn.study import runs"),
     "what stands beside": ("time.simulate", "import reference_models.rig"),
     "for a type checker": ("levels.level.level", "if TYPE_CHECKING:\n    from multiphi_exudyn.levels import model"),
     "inside a function": ("levels.level.level", "def f():\n    from multiphi_exudyn.events import exits"),
@@ -170,7 +170,7 @@ LET_PASS = {
     "an earlier room": ("multiphi_exudyn.levels.model.model", "import multiphi_exudyn.mathematics.modes"),
     "what is in it": ("multiphi_exudyn", "from multiphi_exudyn.time.simulate import simulate"),
     "the plugin": ("reference_models.rig", "from multiphi_exudyn.exudyn_plugin import reduce"),
-    "a reference": ("multiphi_exudyn.study.running.runs", "from reference_models.rig import rig_beam"),
+    "a reference": ("multiphi_exudyn.study.runs", "from reference_models.rig import rig_beam"),
     "a string that is no import": ("multiphi_exudyn.errors", "monkeypatch.setattr('multiphi_exudyn.cli.main', 0)"),
 }
 

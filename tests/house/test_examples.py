@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.study.accuracy import cases
+from multiphi_exudyn.study import study_file
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -128,7 +128,7 @@ def test_first_second_frequencies(capsys, monkeypatch, tmp_path):
     time = np.arange(0.0, 2.0005, 1e-3)
     slower = np.sin(2 * np.pi * 6.0 * time) + 0.1 * np.sin(2 * np.pi * 37.0 * time)
     assert example.rates(time, slower) == pytest.approx(6.0, rel=0.01)
-    shipped = Path(cases.__file__).parent / "shipped" / "clamp.toml"
+    shipped = Path(study_file.__file__).parent / "studies" / "clamp.toml"
     text = shipped.read_text().replace("elements = 12, step = 2e-5", "elements = 6, step = 2e-4")  # of the full beam
     (tmp_path / "clamp.toml").write_text(text)
     monkeypatch.setattr(example, "STUDIES", {str(tmp_path / "clamp.toml"): "rotation [N m/rad]"})

@@ -2,9 +2,10 @@
 
 from small_scene import changed, write
 
-from multiphi_exudyn.study.comparison.compare import compare, summary
-from multiphi_exudyn.study.running import full_runner, runner, timing
-from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study import runners
+from multiphi_exudyn.study import runs as timing
+from multiphi_exudyn.study.compare import compare, summary
+from multiphi_exudyn.study.runners import run_model
 from multiphi_exudyn.study.scene import load_scene
 from multiphi_exudyn.study.setup import prepare
 from reference_models.gentler import attempts
@@ -28,7 +29,7 @@ def test_a_run_that_gains_energy_comes_out_right_at_gentler_settings(tmp_path, m
     assert once.status == "failed"
     assert "gentler" not in once.message
     tried = []
-    monkeypatch.setattr(full_runner, "attempts", lambda *given: tried.append(attempts(*given)) or tried[-1])
+    monkeypatch.setattr(runners, "attempts", lambda *given: tried.append(attempts(*given)) or tried[-1])
     run = run_model(setup, "full", progress=False, retry=True)
     assert run.ok
     assert run.message.startswith("ran with gentler settings (full Newton")
@@ -40,7 +41,7 @@ def test_a_run_that_gains_energy_comes_out_right_at_gentler_settings(tmp_path, m
 
 
 def test_a_run_that_needs_nothing_is_not_tried_again(tmp_path, monkeypatch):
-    monkeypatch.setattr(runner, "repeated", timing.repeated)
+    monkeypatch.setattr(runners, "repeated", timing.repeated)
     run = run_model(bench_of(tmp_path, 1e4, STIFF), "full", progress=False, retry=True)
     assert (run.status, run.message) == ("ok", "")
     assert len(run.repeats_s) >= 7

@@ -4,9 +4,8 @@ import dataclasses
 
 import pytest
 
-from multiphi_exudyn.study.measures.metrics import nrmse
-from multiphi_exudyn.study.measures.stiff_stops import stiff_stops
-from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study.measures import nrmse, stiff_stops
+from multiphi_exudyn.study.runners import run_model
 from multiphi_exudyn.study.scene import scene_data, scene_of
 from multiphi_exudyn.study.setup import prepare
 

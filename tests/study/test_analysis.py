@@ -9,24 +9,24 @@ import pandas as pd
 import pytest
 from small_study import in_turns, result_of, row, small_study, timing
 
-from multiphi_exudyn.study.accuracy.along_axis import numeric_axes, series, tables_along
-from multiphi_exudyn.study.accuracy.analysis import (
+from multiphi_exudyn.study.accuracy import (
     cheapest,
+    csv_text,
     front,
     full_methods,
-    indicators,
     near_cheapest,
+    numeric_axes,
     points,
     pointwise_until,
-    rank_correlation,
     references_at,
+    series,
     settings,
     settings_at_worst,
+    tables_along,
     uncertainty,
     words,
 )
-from multiphi_exudyn.study.accuracy.study_file import MethodSpec
-from multiphi_exudyn.study.accuracy.study_result import csv_text
+from multiphi_exudyn.study.study_file import MethodSpec
 
 STEP = {"step": 1e-4}
 REFINED = MethodSpec(name="m", model={"kind": "reduced"}, refine="modes")
@@ -239,29 +239,6 @@ def test_a_value_that_a_method_lacks_is_an_empty_cell():
     assert error.loc["b"].tolist() == pytest.approx([math.nan, 0.3, 0.4], nan_ok=True)
 
 
-def paired(indicator, error):
-    return pd.DataFrame({"indicator": indicator, "error": error}, dtype=float)
-
-
-def test_the_rank_correlation_sees_order_only_and_leaves_out_what_says_nothing():
-    assert rank_correlation(paired([1, 2, 3, 4], [1e-4, 1e-3, 1e-2, 0.5])) == (pytest.approx(1), 4)
-    assert rank_correlation(paired([1, 2, 3, 4], [4, 3, 2, 1])) == (pytest.approx(-1), 4)
-    mixed = paired([1, 2, 3, 4, 5], [None, 1e-10, 2, 1, 3])
-    assert rank_correlation(mixed) == (pytest.approx(0.5), 3)  # ranks 1 2 3 against 2 1 3
-
-
-@pytest.mark.parametrize("pairs", [[], [(1, 1), (2, 2)], [(1, 1), (1, 2), (1, 3)]])
-def test_too_few_or_equal_values_have_no_correlation(pairs):
-    assert rank_correlation(paired([a for a, _ in pairs], [b for _, b in pairs])) == (None, len(pairs))
-
-
-def test_every_run_with_an_indicator_counts():
-    found = indicators(small_study())
-    assert dict(found.method.value_counts()) == {"Multi-Phi": 6, "Multi-Phi, rigid": 5}
-    first = found.iloc[0]
-    assert (first.indicator, first.error) == pytest.approx(((1.2 * 3**-2.5) ** 1.2, 1.2 * 3**-2.5))
-
-
 def test_pointwise_comparison_ends_where_the_coarser_copy_leaves():
     assert pointwise_until(small_study(), {}, 0.01) == 0.25
     assert pointwise_until(small_study(), {}, 0.02) is None
@@ -283,13 +260,6 @@ def test_the_csv_gives_every_number_back():
     nearby = [line for line in read if line["nearby.step"]]
     assert len(nearby) == 2 * 2 * (12 + 12)
     assert all(line["timing.online_s"] == "" for line in nearby)
-
-
-def test_budgets_have_lines_of_their_own():
-    budget = replace(row("budget"), values={"rungs": [{"name": "full"}], "total": math.pi})
-    read = list(csv.DictReader(io.StringIO(csv_text(result_of([row("a", 0.1)], budgets=(budget,))))))
-    assert [line["budget.total"] for line in read] == ["", str(math.pi)]
-    assert read[1]["budget.rungs"] == '[{"name": "full"}]'
 
 
 def test_settings_are_said_in_words():

@@ -9,7 +9,7 @@ from small_scene import BEAM, changed, write
 
 import multiphi_exudyn as mp
 from multiphi_exudyn import cli
-from multiphi_exudyn.study.comparison.animation import (
+from multiphi_exudyn.study.animation import (
     CLOSED,
     LONGEST,
     MOST_FRAMES,
@@ -20,7 +20,7 @@ from multiphi_exudyn.study.comparison.animation import (
     moving_figure,
     prepare_animation,
 )
-from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study.runners import run_model
 from multiphi_exudyn.study.scene import load_scene
 from multiphi_exudyn.study.setup import prepare
 

@@ -8,7 +8,7 @@ from small_scene import BEAM, write
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.mechanics.beam import Beam, Section, planar_beam
-from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study.runners import run_model
 from multiphi_exudyn.study.scene import load_scene, mechanics_of
 from multiphi_exudyn.study.setup import prepare
 from reference_models.beams import Beams

@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from small_scene import changed, write
 from test_scenes import JUNK, places
 
-import multiphi_exudyn.study.accuracy.cases as cases
 import multiphi_exudyn.study.scene as scenes
+import multiphi_exudyn.study.study_file as cases
 from multiphi_exudyn import MultiPhiTypeError, MultiPhiValueError, cli
 from multiphi_exudyn.study.scene import mechanics_of, read_toml
 
 FOLDERS = {"scene": scenes, "study": cases}
 SHIPPED = {
     "scene": sorted(scenes.shipped().values()),
-    "study": sorted((Path(cases.__file__).parent / "shipped").glob("*.toml")),
+    "study": sorted((Path(cases.__file__).parent / "studies").glob("*.toml")),
 }
 HARD = st.sampled_from(
     [math.nan, math.inf, -math.inf, 0, -1, 10**18, -1e300, 5e-324, "", "é\u202e\0", "paper-rig", [], {}, [[]], True]

@@ -7,8 +7,8 @@ from small_scene import write
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.mechanics.beam import Clamp, planar_beam
-from multiphi_exudyn.study.measures.metrics import nrmse
-from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study.measures import nrmse
+from multiphi_exudyn.study.runners import run_model
 from multiphi_exudyn.study.scene import load_scene, mechanics_of
 from multiphi_exudyn.study.setup import prepare
 from reference_models.exact_beam import exact_frequencies

@@ -1,6 +1,6 @@
 """Where something ran: what is told of it."""
 
-from multiphi_exudyn.study.running import environment
+from multiphi_exudyn.study import runs as environment
 
 LATE = 0.3  # s
 

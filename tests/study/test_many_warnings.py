@@ -17,16 +17,13 @@ from small_study import ENVIRONMENT, METHODS, result_of, row
 import multiphi_exudyn as mp
 from multiphi_exudyn import cli
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
-from multiphi_exudyn.study.accuracy import study_report
-from multiphi_exudyn.study.accuracy.study_findings import study_warnings
-from multiphi_exudyn.study.accuracy.study_report import render_study
-from multiphi_exudyn.study.comparison import report
-from multiphi_exudyn.study.comparison.compare import compare, summary
-from multiphi_exudyn.study.comparison.findings import comparison_warnings
-from multiphi_exudyn.study.comparison.pages import Picture
-from multiphi_exudyn.study.comparison.report import render
-from multiphi_exudyn.study.running.runners import run_model
-from multiphi_exudyn.study.running.runs import from_arrays, to_arrays
+from multiphi_exudyn.study import accuracy_report, report
+from multiphi_exudyn.study.accuracy_report import render_study, study_warnings
+from multiphi_exudyn.study.compare import compare, summary
+from multiphi_exudyn.study.details import Details
+from multiphi_exudyn.study.report import Picture, comparison_warnings, render
+from multiphi_exudyn.study.runners import run_model
+from multiphi_exudyn.study.runs import from_arrays, to_arrays
 from multiphi_exudyn.study.scene import load_scene
 from multiphi_exudyn.study.setup import prepare
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
@@ -50,8 +47,8 @@ def warning_runs(monkeypatch):
 def no_pictures(monkeypatch):
     """Pages without them, which take most of their time."""
     monkeypatch.setattr(report, "_pictures", lambda comparison, levels: ())
-    monkeypatch.setattr(study_report, "_drawn", lambda figure, caption: None)
-    monkeypatch.setattr(study_report, "_along", lambda result, axis: (axis, Picture("", ""), []))
+    monkeypatch.setattr(accuracy_report, "_drawn", lambda figure, caption: None)
+    monkeypatch.setattr(accuracy_report, "_along", lambda result, axis: (axis, Picture("", ""), []))
 
 
 @pytest.fixture
@@ -119,7 +116,7 @@ def test_a_comparison_shows_what_its_models_warn_of_first(warning_runs, scene_fi
         "all from 0.05 s on"
     )
     assert len(told) == 3
-    page = text_of(render(comparison, (), {}))
+    page = text_of(render(comparison, Details()))
     assert page.index("Linear range: 2 of 2 runs (all, r6); the first: moments") < page.index("Key figures")
     assert "sensitivity horizon" in page
 
@@ -129,7 +126,7 @@ def test_a_model_that_warns_of_nothing_is_shown_without_a_word(scene_file, monke
     monkeypatch.setattr(Trajectory, "horizon", lambda self, tolerance: self.t_end)
     comparison = compare(bench_of(scene_file), ENVIRONMENT, progress=False)
     assert comparison_warnings(comparison) == []
-    assert "whole run" in text_of(render(comparison, (), {}))
+    assert "whole run" in text_of(render(comparison, Details()))
 
 
 def test_a_comparison_prints_a_line_for_each_and_issues_none(warning_runs, scene_file, tmp_path, capsys):

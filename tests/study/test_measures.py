@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from small_scene import changed, write
 
-from multiphi_exudyn.study.measures import metrics
-from multiphi_exudyn.study.measures.measures import horizons, measures
-from multiphi_exudyn.study.running.runners import run_model
-from multiphi_exudyn.study.running.runs import ModelRun, from_arrays, to_arrays
+from multiphi_exudyn.study.measures import METRICS, horizons, measures_of
+from multiphi_exudyn.study.runners import run_model
+from multiphi_exudyn.study.runs import ModelRun, from_arrays, to_arrays
 from multiphi_exudyn.study.scene import load_scene
 from multiphi_exudyn.study.setup import prepare
 
@@ -63,19 +62,19 @@ def scaled(run, share):
 
 
 def test_the_measures_are_these_and_nothing_else(setup, reference):
-    assert list(measures(setup, reference, reference)) == KEYS
+    assert list(measures_of(setup, reference, reference)) == KEYS
 
 
 def test_every_measure_is_defined(setup, reference):
-    assert set(KEYS) - {"label", "kind"} <= set(metrics.METRICS)
-    assert set(metrics.METRICS) - set(KEYS) == {
+    assert set(KEYS) - {"label", "kind"} <= set(METRICS)
+    assert set(METRICS) - set(KEYS) == {
         "pointwise_until",
         "stiff_nrmse",
     }  # of two runs, of a study
 
 
 def test_differences_to_the_reference_by_window_and_point(setup, reference):
-    found = measures(setup, scaled(reference, 0.03), reference)
+    found = measures_of(setup, scaled(reference, 0.03), reference)
     for name in ("nrmse", "spectral_difference"):
         assert list(found[name]) == ["0.1", "0.2"]
         for table in found[name].values():
@@ -90,7 +89,7 @@ def test_the_horizon_is_that_of_the_judged_points(setup, reference):
 
 
 def test_contacts_energy_and_ledger(setup, reference):
-    found = measures(setup, reference, None)
+    found = measures_of(setup, reference, None)
     assert found["first_contact"] == {"stop": 0.03}
     assert found["contact_count"] == {"stop": 2}
     assert found["closed_time"] == {"stop": pytest.approx(0.008)}
@@ -107,14 +106,14 @@ def test_contacts_energy_and_ledger(setup, reference):
 def test_without_a_reference_there_are_no_differences(setup, reference):
     failed = ModelRun("full", "full", "full", status="failed", message="no convergence")
     for missing in (None, failed):
-        found = measures(setup, reference, missing)
+        found = measures_of(setup, reference, missing)
         assert [found[name] for name in RELATIVE] == [{}] * 4
         assert list(found) == KEYS
 
 
 def test_a_failed_run_has_its_label_and_no_numbers(setup, reference):
     failed = ModelRun("full", "full", "full beam", status="failed", message="no convergence")
-    found = measures(setup, failed, reference)
+    found = measures_of(setup, failed, reference)
     assert list(found) == KEYS
     assert found["label"] == "full beam"
     assert found["energy_end"] is None
@@ -123,7 +122,7 @@ def test_a_failed_run_has_its_label_and_no_numbers(setup, reference):
 
 
 def test_a_run_that_never_touches_has_no_first_contact(setup, reference):
-    found = measures(setup, replace(reference, contact_intervals={"stop": np.zeros((0, 2))}), None)
+    found = measures_of(setup, replace(reference, contact_intervals={"stop": np.zeros((0, 2))}), None)
     assert found["first_contact"] == {"stop": None}
     assert found["intervals"] == {"stop": []}
     assert found["contact_count"] == {"stop": 0} == found["inner_losses"]
@@ -132,9 +131,9 @@ def test_a_run_that_never_touches_has_no_first_contact(setup, reference):
 def test_measures_are_json_without_numbers_that_do_not_exist(setup, reference, simulated):
     still = scaled(reference, -1.0)
     for run, other in ((simulated, reference), (reference, still), (still, reference)):
-        found = measures(setup, run, other)
+        found = measures_of(setup, run, other)
         assert json.loads(json.dumps(found, allow_nan=False)) == found
-    assert measures(setup, reference, still)["nrmse"]["0.1"]["tip"] is None
+    assert measures_of(setup, reference, still)["nrmse"]["0.1"]["tip"] is None
 
 
 def test_windows_end_with_the_run(setup):
@@ -152,7 +151,7 @@ def test_a_run_stored_as_arrays_is_the_same_run(setup, reference, simulated, tmp
         np.testing.assert_equal(vars(restored), vars(run))
         assert type(restored.steps) is int
         assert type(restored.message) is str
-        assert measures(setup, restored, reference) == measures(setup, run, reference)
+        assert measures_of(setup, restored, reference) == measures_of(setup, run, reference)
 
 
 def test_arrays_are_named_by_field_and_entry(reference):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from multiphi_exudyn.study.measures import metrics
+from multiphi_exudyn.study import measures as metrics
 
 TIME = np.linspace(0, 1, 101)
 HISTORY = np.cos(40 * TIME)

@@ -7,18 +7,26 @@ import pytest
 from small_scene import BEAM, changed, write
 
 from multiphi_exudyn import cli
-from multiphi_exudyn.study.running import needs as needs_module
-from multiphi_exudyn.study.running.needs import needs_of
-from multiphi_exudyn.study.running.run_alone import run_alone
+from multiphi_exudyn.study import needs as needs_module
+from multiphi_exudyn.study.needs import needs_of
+from multiphi_exudyn.study.run_alone import run_alone
 from multiphi_exudyn.study.scene import load_scene, shipped_scenes
 
 LEVELS = {
     "rubbing-stop": 4,
     "beam-chain": 8,
     "bed-of-stops": 21,
+    "rig-clamp-play": 3,
     "two-sided-stop": 3,
 }  # two for all others
-POSSIBLE = {"beam-chain": 8, "bed-of-stops": 2**100, "two-sided-stop": 4, "friction-ring": 3, "rubbing-stop": 4}
+POSSIBLE = {
+    "beam-chain": 8,
+    "bed-of-stops": 2**100,
+    "two-sided-stop": 4,
+    "rig-clamp-play": 4,
+    "friction-ring": 3,
+    "rubbing-stop": 4,
+}
 MEMORY = {
     "beam-chain": 10e6,
     "bed-of-stops": 70e6,
@@ -44,7 +52,7 @@ def test_a_shipped_scene_takes_what_it_visits(name):
     assert needs.status == "ok"
     assert needs.levels_built == LEVELS.get(name, 2)
     assert needs.levels_possible == POSSIBLE.get(name, 2)
-    assert needs.dofs_carried <= 0.2 * needs.dofs_given
+    assert needs.dofs_carried <= 0.3 * needs.dofs_given
     assert 0 < needs.memory <= MEMORY.get(name, 8e6)
 
 

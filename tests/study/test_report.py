@@ -14,18 +14,15 @@ from small_scene import BEAM, changed, write
 
 import multiphi_exudyn as mp
 from multiphi_exudyn import cli
-from multiphi_exudyn.study.comparison import figure_style, plots
-from multiphi_exudyn.study.comparison.compare import Comparison, compare, histories, summary
-from multiphi_exudyn.study.comparison.findings import findings
-from multiphi_exudyn.study.comparison.losses import loss_tables
-from multiphi_exudyn.study.comparison.mode_shapes import level_modes
-from multiphi_exudyn.study.comparison.pages import embedded
-from multiphi_exudyn.study.comparison.report import contact_totals, render
-from multiphi_exudyn.study.comparison.wording import engineering, percent, seconds, times
-from multiphi_exudyn.study.measures.stiff_stops import StiffStops
-from multiphi_exudyn.study.running.runs import ModelRun
+from multiphi_exudyn.study import plots
+from multiphi_exudyn.study.compare import Comparison, compare, histories, summary
+from multiphi_exudyn.study.details import Details, details_of, level_modes
+from multiphi_exudyn.study.measures import StiffStops
+from multiphi_exudyn.study.report import contact_totals, embedded, findings, render
+from multiphi_exudyn.study.runs import ModelRun
 from multiphi_exudyn.study.scene import load_scene
 from multiphi_exudyn.study.setup import prepare
+from multiphi_exudyn.study.wording import engineering, percent, seconds, times
 
 pytestmark = pytest.mark.usefixtures("few_elements")
 
@@ -89,7 +86,7 @@ def drawn(setup, name, share, online_s):
 @pytest.fixture(scope="module")
 def page(comparison, pictures):
     with pictures():
-        return render(comparison, level_modes(comparison), loss_tables(comparison.setup))
+        return render(comparison, details_of(comparison))
 
 
 def text_of(page):
@@ -141,13 +138,13 @@ def test_the_key_figures_are_the_uncertainty_and_the_speed_ups(comparison):
 
 def test_the_page_holds_its_pictures_and_points_nowhere_else(page):
     sources = re.findall(r'src="([^"]*)"', page)
-    assert len(sources) == 6  # two points, error over time, contact, energy, modes
+    assert len(sources) == 9  # two points, error over time, contact, energy, modes, initial shape, maps, long after
     assert all(source.startswith("data:image/png;base64,iVBOR") for source in sources)
     assert not re.search(r"href=\"|url\(|src=\"h|http", page)
 
 
 def test_the_page_has_the_samples_of_its_histories_and_names_cannot_end_their_element(comparison):
-    page = render(comparison, (), {})
+    page = render(comparison, Details())
     text = re.search(r'<script type="application/json" id="zoom-data">(.*?)</script>', page, re.DOTALL)[1]
     data = json.loads(text)
     assert [plot["label"] for plot in data] == ["middle [mm]", "tip [mm]", "force of stop [N]"]
@@ -203,7 +200,7 @@ def test_the_histories_are_arrays_on_one_grid(comparison):
 def test_without_rigid_levels_no_stiff_stop_is_told_of(comparison):
     plain = replace(comparison, stiff=None)
     assert "stiff" not in " ".join(findings(plain)["distrust"])
-    assert "Rigid levels" not in text_of(render(plain, (), {}))
+    assert "Rigid levels" not in text_of(render(plain, Details()))
     assert summary(plain)["stiff_stops"] == {}
 
 
@@ -211,7 +208,7 @@ def test_a_stiff_stop_that_failed_is_told_with_its_cause(comparison):
     spoiled = replace(comparison, stiff=StiffStops((1e8, 1e9, 1e10), (), "chatter at 0.1 s"))
     assert "the run with stiff stops failed: chatter at 0.1 s" in " ".join(findings(spoiled)["distrust"])
     assert summary(spoiled)["stiff_stops"]["errors"] == {}
-    assert "Rigid levels against stiff stops" not in text_of(render(spoiled, (), {}))
+    assert "Rigid levels against stiff stops" not in text_of(render(spoiled, Details()))
 
 
 def test_windows_end_with_the_run_and_the_headline_takes_the_longest_that_fits(comparison):
@@ -227,7 +224,7 @@ def test_a_failed_model_is_a_row_with_its_cause(comparison):
     failed = ModelRun("rigid-r6", "reduced", "rigid", status="failed", message="chatter <at> 0.1 s")
     spoiled = replace(comparison, runs=dict(comparison.runs) | {"rigid-r6": failed})
     assert "Failed: rigid-r6 (chatter <at> 0.1 s)" in " ".join(findings(spoiled)["outcome"])
-    assert "failed: chatter &lt;at&gt; 0.1 s" in render(spoiled, (), {})
+    assert "failed: chatter &lt;at&gt; 0.1 s" in render(spoiled, Details())
     content = summary(spoiled)
     assert content["models"]["rigid-r6"]["speedup"] is None
     assert "rigid-r6" not in content["errors"]
@@ -236,7 +233,7 @@ def test_a_failed_model_is_a_row_with_its_cause(comparison):
 def test_without_its_reference_the_report_says_so_and_measures_nothing(comparison):
     failed = ModelRun("full", "full", "full beam", status="failed", message="no convergence at 0.02 s")
     spoiled = replace(comparison, runs=dict(comparison.runs) | {"full": failed})
-    text = text_of(render(spoiled, level_modes(spoiled), {}))
+    text = text_of(render(spoiled, Details(levels=level_modes(spoiled))))
     assert "The reference failed, so there are no errors: no convergence at 0.02 s" in text
     content = summary(spoiled)
     assert content["errors"] == {} == content["reference_uncertainty"] == content["agreement_horizon_s"]
@@ -248,7 +245,7 @@ def test_without_a_coarser_copy_the_uncertainty_is_called_unknown(comparison, pi
     assert "uncertainty is unknown" in " ".join(findings(spoiled)["distrust"])
     assert summary(spoiled)["reference_uncertainty"] == {}
     with pictures():
-        assert figure_style.png(plots.error_time_figure(spoiled)).startswith(b"\x89PNG")
+        assert plots.png(plots.error_time_figure(spoiled)).startswith(b"\x89PNG")
 
 
 def test_a_busy_machine_is_told_with_its_load(comparison, capsys):
@@ -300,7 +297,7 @@ def test_a_scene_of_matrices_is_compared_without_shapes(tmp_path):
     assert [run.status for run in compared.runs.values()] == ["ok", "ok"]
     assert compared.environment["load_average"] >= 0
     assert level_modes(compared) == ()
-    page = text_of(render(compared, (), loss_tables(compared.setup)))
+    page = text_of(render(compared, details_of(compared)))
     assert "A static force of +1 N at tip" in page
     assert "Offline: time to compute modes and the static start; the matrices are given." in page
 
@@ -343,7 +340,7 @@ def test_modes_of_several_beams_are_of_the_levels_the_reference_held_longest(tmp
     touching = next(level for level in levels if level.closed == ("ab",))
     first, second, _ = (beam.shapes[0][-1] for beam in touching.beams)
     assert first == pytest.approx(second, rel=0.05)
-    page = render(compared, levels, {})
+    page = render(compared, Details(levels=levels))
     assert page.count("data:image/png") == 1 + 1 + 2 + 1 + 1
     assert "the contact ab between a.tip and b.tip (gap 1 mm, 10 kN/m)" in text_of(page)
 
@@ -356,8 +353,8 @@ def test_many_contacts_are_told_of_together(tmp_path):
     data = changed(["outputs"], {"t_end": 0.1, "points": ["tip"], "interval": 1e-3}, data)
     scene = load_scene(write(tmp_path / "bed.toml", data))
     compared = compare(prepare(scene), {}, progress=False)
-    page = render(compared, level_modes(compared), loss_tables(compared.setup))
-    assert page.count("data:image/png") == 1 + 1 + 1 + 1 + 1
+    page = render(compared, details_of(compared))
+    assert page.count("data:image/png") == 1 + 1 + 1 + 1 + 1 + 1
     assert "meets 6 contacts from s1 to s6 (gap 1 mm, 10 kN/m each)" in text_of(page)
     totals = contact_totals(compared).loc[compared.reference.name]
     assert 1 < totals["most at once"] <= totals["contacts touched"] <= 6

@@ -13,10 +13,11 @@ from multiphi_exudyn import (
     planar_beam,
 )
 from multiphi_exudyn.mechanics.structure import damping_matrix
-from multiphi_exudyn.study.measures.metrics import nrmse
-from multiphi_exudyn.study.running import runner, timing
-from multiphi_exudyn.study.running.runners import run_model
-from multiphi_exudyn.study.running.timing import in_turns, repeated, undisturbed
+from multiphi_exudyn.study import runners
+from multiphi_exudyn.study import runs as timing
+from multiphi_exudyn.study.measures import nrmse
+from multiphi_exudyn.study.runners import run_model
+from multiphi_exudyn.study.runs import in_turns, repeated, undisturbed
 from multiphi_exudyn.study.scene import load_scene
 from multiphi_exudyn.study.setup import prepare, start_configuration
 from reference_models.rig import rig_beam
@@ -268,6 +269,6 @@ def test_turns_end_with_their_round_where_they_take_long():
 def test_a_first_run_that_builds_levels_is_no_measure_of_a_repeat(setup, monkeypatch, name, counts):
     """However long it takes, repeats follow; a full beam that takes as long is not run again."""
     told = []
-    monkeypatch.setattr(runner, "repeated", lambda run, first, fewest: told.append(first) or ())
+    monkeypatch.setattr(runners, "repeated", lambda run, first, fewest: told.append(first) or ())
     run_model(setup, name)
     assert (told[0] > 0) == counts

@@ -10,13 +10,14 @@ from small_scene import BEAM, changed, write
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.cli import main
-from multiphi_exudyn.study.accuracy.cases import load_study
-from multiphi_exudyn.study.comparison.compare import compare, histories, summary
-from multiphi_exudyn.study.comparison.plots import grey_spans, history_figure
-from multiphi_exudyn.study.comparison.report import render
-from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study.compare import compare, histories, summary
+from multiphi_exudyn.study.details import Details
+from multiphi_exudyn.study.plots import grey_spans, history_figure
+from multiphi_exudyn.study.report import render
+from multiphi_exudyn.study.runners import run_model
 from multiphi_exudyn.study.scene import load_scene, mechanics_of
 from multiphi_exudyn.study.setup import prepare
+from multiphi_exudyn.study.study_file import load_study
 
 pytestmark = pytest.mark.usefixtures("few_elements")
 
@@ -64,7 +65,7 @@ def test_full_beam_reduced_model_and_body_answer_alike(compared):
 
 
 def test_the_page_and_the_files_tell_of_it(compared):
-    page, content, arrays = render(compared, [], {}), summary(compared), histories(compared)
+    page, content, arrays = render(compared, Details()), summary(compared), histories(compared)
     assert "<th>friction ring</th>" in page
     assert "how far the patch has slipped" in page
     assert content["scene"]["friction"] == [RING | {"velocity": 0.0}]
@@ -81,7 +82,7 @@ def test_grey_is_where_it_sticks_if_there_are_no_contacts(compared):
     spans, _ = grey_spans(compared.reference)
     assert len(spans) == len(figure.axes[0].patches) > 1
     assert spans == pytest.approx(compared.reference.stick_intervals["ring"])
-    assert "the first contact phase, and" not in render(compared, [], {})
+    assert "the first contact phase, and" not in render(compared, Details())
 
 
 def test_the_user_object_of_a_stop_that_rubs_is_its_reduced_model():

@@ -5,15 +5,13 @@ import pytest
 from small_scene import BEAM, changed, write
 
 from multiphi_exudyn import MultiPhiValueError
-from multiphi_exudyn.study.comparison.compare import compare, summary
-from multiphi_exudyn.study.comparison.findings import findings
-from multiphi_exudyn.study.comparison.losses import loss_tables
-from multiphi_exudyn.study.comparison.mode_shapes import level_modes
-from multiphi_exudyn.study.comparison.report import render
-from multiphi_exudyn.study.comparison.wording import percent
-from multiphi_exudyn.study.measures.metrics import nrmse
+from multiphi_exudyn.study.compare import compare, summary
+from multiphi_exudyn.study.details import details_of, level_modes
+from multiphi_exudyn.study.measures import nrmse
+from multiphi_exudyn.study.report import findings, render
 from multiphi_exudyn.study.scene import load_scene, mechanics_of
 from multiphi_exudyn.study.setup import prepare, start_configuration
+from multiphi_exudyn.study.wording import percent
 
 pytestmark = pytest.mark.usefixtures("few_elements")
 
@@ -184,7 +182,7 @@ class TestReport:
         assert f"by {len(law.slopes)} straight segments from -5 to 5 mm, to {percent(law.error)} of" in followed
         assert "leaves the span of the force law spring (-5 to 5 mm): it reaches" in followed
         assert comparison.runs["r6"].label == "Multi-Phi, levels of force laws, r = 6"
-        page = render(comparison, level_modes(comparison), loss_tables(comparison.setup))
+        page = render(comparison, details_of(comparison))
         assert "Without the force laws" in page
         assert summary(comparison)["scene"]["force_laws"][0]["k3"] == 2e6
 

@@ -16,13 +16,11 @@ from multiphi_exudyn import (
     SweepLoad,
     simulate,
 )
-from multiphi_exudyn.study.accuracy.budget import budget
-from multiphi_exudyn.study.comparison.compare import compare, summary
-from multiphi_exudyn.study.comparison.findings import findings
-from multiphi_exudyn.study.comparison.losses import loss_tables
-from multiphi_exudyn.study.comparison.mode_shapes import level_modes
-from multiphi_exudyn.study.comparison.report import render
-from multiphi_exudyn.study.measures.metrics import nrmse
+from multiphi_exudyn.study.budget import budget
+from multiphi_exudyn.study.compare import compare, summary
+from multiphi_exudyn.study.details import details_of, loss_tables
+from multiphi_exudyn.study.measures import nrmse
+from multiphi_exudyn.study.report import findings, render
 from multiphi_exudyn.study.scene import load_scene, mechanics_of
 from multiphi_exudyn.study.setup import prepare, start_configuration
 
@@ -234,7 +232,7 @@ class TestReport:
         assert "released" not in told
 
     def test_energies_are_shares_of_the_largest(self, comparison):
-        page = render(comparison, level_modes(comparison), loss_tables(comparison.setup))
+        page = render(comparison, details_of(comparison))
         assert "Shares of the largest energy of the run" in page
         assert "<th>work of loads</th>" in page
         run = comparison.runs["r6"]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from multiphi_exudyn.study.measures.spectra import FREQUENCIES, spectral_difference, wavelet_map
+from multiphi_exudyn.study.measures import FREQUENCIES, spectral_difference, wavelet_map
 
 STEP = 1e-4
 

@@ -5,9 +5,9 @@ import pytest
 from small_scene import BEAM, changed, write
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.study.measures import stiff_stops as module
-from multiphi_exudyn.study.measures.stiff_stops import rigid_models, stiff_stops
-from multiphi_exudyn.study.running.runners import run_model
+from multiphi_exudyn.study import measures as module
+from multiphi_exudyn.study.measures import rigid_models, stiff_stops
+from multiphi_exudyn.study.runners import run_model
 from multiphi_exudyn.study.scene import load_scene
 from multiphi_exudyn.study.setup import prepare
 

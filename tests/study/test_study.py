@@ -7,18 +7,17 @@ import pytest
 from small_scene import BEAM, changed, write
 
 from multiphi_exudyn import MultiPhiValueError
-from multiphi_exudyn.study.accuracy.analysis import points, settings, settings_at, stiff_errors, uncertainty
-from multiphi_exudyn.study.accuracy.cases import CASE, load_study, shipped_studies
-from multiphi_exudyn.study.accuracy.study import run_study
-from multiphi_exudyn.study.running import runner, timing
-from multiphi_exudyn.study.running.runs import ModelRun
+from multiphi_exudyn.study import runners
+from multiphi_exudyn.study import runs as timing
+from multiphi_exudyn.study.accuracy import points, run_study, settings, settings_at, stiff_errors, uncertainty
+from multiphi_exudyn.study.runs import ModelRun
 from multiphi_exudyn.study.setup import prepare
 from multiphi_exudyn.study.store import Store
+from multiphi_exudyn.study.study_file import CASE, load_study, shipped_studies
 from multiphi_exudyn.study.sweep import open_executor
 
 SHIPPED = (
     "amplitude",
-    "budget",
     "clamp",
     "clamp-play",
     "clamp-translation",
@@ -123,7 +122,7 @@ class TestCases:
             np.savez(tmp_path / "beam.npz", mass=np.eye(20), stiffness=stiffness * np.eye(20))
             study = load_study(study_file(STUDY | {"axes": {}, "quick": {}}))
             found.append(study.runs({})[1]["content"])
-        monkeypatch.setattr("multiphi_exudyn.study.accuracy.cases._versions", lambda: {"exudyn": "another"})
+        monkeypatch.setattr("multiphi_exudyn.study.study_file._versions", lambda: {"exudyn": "another"})
         found.append(study.runs({})[1]["content"])
         assert len(set(found)) == 3
 
@@ -146,7 +145,7 @@ class TestCases:
             (["methods", 1, "nearby"], {"method": [0.9]}, "nearby of stepwise: got 'method'"),
             (["methods", 1, "name"], "levels", "methods: got 'levels', need another name"),
             (["methods", 1, "name"], "reference", "methods: got 'reference', need another name"),
-            (["methods"], [], "methods: got 'none', need a method or a budget"),
+            (["methods"], [], "methods: "),
             (["maps"], ["nothing"], "maps: got 'nothing', need one of the methods"),
             (["time_limit_s"], 0, "time_limit_s: got 0"),
             (["methods", 0, "refine"], "step", "refine of levels: got 'step', need a field"),
@@ -183,7 +182,7 @@ class TestCases:
     @pytest.mark.parametrize("name", SHIPPED)
     def test_the_shipped_studies_are_sound(self, name, quick):
         study = load_study(name, quick=quick)
-        assert study.runs(study.points[0]) or study.budgets()
+        assert study.runs(study.points[0])
 
     def test_the_shipped_studies_are_these(self):
         assert tuple(shipped_studies()) == SHIPPED
@@ -198,7 +197,7 @@ class TestRunning:
         write(folder / "small.toml", SCENE)
         study = load_study(write(folder / "study.toml", STUDY))
         with Store(folder / "runs.sqlite") as opened, pytest.MonkeyPatch.context() as patch:
-            patch.setattr(runner, "repeated", timing.repeated)
+            patch.setattr(runners, "repeated", timing.repeated)
             patch.setattr(timing, "ROUNDS", timing.FEWEST_ROUNDS)
             yield study, opened, run_study(study, opened, progress=False)
 
@@ -226,7 +225,7 @@ class TestRunning:
 
     def test_what_has_run_is_not_run_again(self, finished, monkeypatch):
         study, store, first = finished
-        module = "multiphi_exudyn.study.accuracy.study.run_model"
+        module = "multiphi_exudyn.study.accuracy.run_model"
         monkeypatch.setattr(module, lambda *given, **named: pytest.fail("run again"))
         again = run_study(study, store, progress=False)
         assert again.rows == first.rows
@@ -261,8 +260,8 @@ class TestRunning:
 
     def test_a_setting_that_is_none_at_a_later_point_is_a_gap_with_its_cause(self, store, monkeypatch):
         """Levels with printed frequencies are rigid: at that parameter set the compliant ones are refused."""
-        monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.run_model", at_rest)
-        monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.stiff_stops", lambda setup: None)
+        monkeypatch.setattr("multiphi_exudyn.study.accuracy.run_model", at_rest)
+        monkeypatch.setattr("multiphi_exudyn.study.accuracy.stiff_stops", lambda setup: None)
         study = load_study("sets", quick=True)
         result = run_study(study, store, progress=False)
         refused = {row.parameters["method"] for row in result.rows if "printed frequencies" in row.message}
@@ -280,7 +279,7 @@ class TestRunning:
         against = stiff_errors(result, {})
         assert [setting["modes"] for setting in against.setting] == [4, 8]
         assert (against.stiff_uncertainty == found["rigid"]["uncertainty"]["0.08"]["tip"]).all()
-        monkeypatch.setattr("multiphi_exudyn.study.accuracy.study.stiff_stops", lambda setup: pytest.fail("run again"))
+        monkeypatch.setattr("multiphi_exudyn.study.accuracy.stiff_stops", lambda setup: pytest.fail("run again"))
         assert run_study(study, store, progress=False).rows == result.rows
 
     def test_histories_are_kept_on_request(self, study_file, store):

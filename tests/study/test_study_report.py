@@ -1,30 +1,29 @@
 """The study's page and pictures: complete, self-contained, and honest about gaps and what is not known."""
 
 import base64
-import json
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
-from matplotlib.figure import Figure
 from small_study import METHODS, coarser, contact, in_turns, map_pairs, result_of, row, small_study, timing
 
-from multiphi_exudyn.study.accuracy import study_report
-from multiphi_exudyn.study.accuracy.analysis import cheapest, over_all_points, settings
-from multiphi_exudyn.study.accuracy.map_figure import map_figure
-from multiphi_exudyn.study.accuracy.study_figures import (
+from multiphi_exudyn.study import accuracy_report
+from multiphi_exudyn.study.accuracy import cheapest, over_all_points, settings
+from multiphi_exudyn.study.accuracy_report import (
     along_figure,
     convergence_figure,
-    indicator_figure,
+    error_text,
+    findings,
     pareto_figure,
+    render_study,
     response_figure,
+    shown_points,
     styles,
 )
-from multiphi_exudyn.study.accuracy.study_findings import error_text, findings, shown_points
-from multiphi_exudyn.study.accuracy.study_report import render_study
-from multiphi_exudyn.study.comparison.wording import percent
+from multiphi_exudyn.study.plots import map_figure
+from multiphi_exudyn.study.wording import percent
 
 AXIS = {"start.displacement": [-0.01, 0.02]}
 STEP = {"step": 1e-4}
@@ -163,7 +162,6 @@ def test_every_section_with_data_appears_in_its_place(page):
         "Error against run time",
         "The cheapest model for a tolerance",
         "Convergence",
-        "The indicator: a prediction of the error without a reference",
         "Time-frequency maps",
         "Contact, every method at its most accurate setting",
         "Failed runs",
@@ -192,20 +190,9 @@ def test_sections_without_data_do_not_appear():
 
 def test_the_page_holds_its_pictures_and_points_nowhere_else(page):
     sources = re.findall(r'src="([^"]*)"', page)
-    assert len(sources) == 4  # error over time, convergence, indicator, maps
+    assert len(sources) == 3  # error over time, convergence, maps
     assert all(source.startswith("data:image/png;base64,iVBOR") for source in sources)
     assert not re.search(r"href=\"|url\(|<script src|http", page)
-
-
-def test_the_plot_that_zooms_has_every_setting_and_the_front_of_its_method(page, result):
-    (plot,) = json.loads(re.search(r'id="zoom-data">(.*?)</script>', page, re.DOTALL)[1])
-    every, front = (line for line in plot["lines"] if line["name"] == "Multi-Phi")
-    own = settings(result).query("method == 'Multi-Phi'")
-    assert numbers(every["data"]) == pytest.approx(100 * own.error, rel=1e-6)
-    assert numbers(every["x"]) == pytest.approx(1e3 * own.online_s.astype(float), rel=1e-6)
-    assert every["notes"][0] == "r = 3"
-    assert list(numbers(front["data"])) == sorted(numbers(front["data"]), reverse=True)
-    assert plot["below"] == pytest.approx(0.1)
 
 
 def numbers(text):
@@ -238,7 +225,7 @@ def test_failures_are_listed_with_place_and_cause(page):
 
 
 def test_many_failures_are_cut_short_and_counted(monkeypatch):
-    monkeypatch.setattr(study_report, "MOST_FAILURES", 2)
+    monkeypatch.setattr(accuracy_report, "MOST_FAILURES", 2)
     rows = [row("a", setting={"modes": i}, status="failed", message="why") for i in range(5)]
     text = text_of(render_study(result_of(rows)))
     assert text.count("failed why") == 2
@@ -330,12 +317,6 @@ def test_convergence_shows_every_numeric_field_with_orders_and_gaps(result):
     assert convergence_figure(result_of([row("a", 0.1)]), {}) is None
 
 
-def test_the_indicator_figure_tells_the_correlation(result):
-    assert "rank correlation 1.00, 11 runs" in indicator_figure(result).axes[0].get_title(loc="left")
-    assert indicator_figure(result_of([row("a", 0.1)])) is None
-    assert "unknown, 0 runs" in indicator_figure(result_of([row("a", indicator=0.1)])).axes[0].get_title(loc="left")
-
-
 def test_the_figure_along_an_axis_leaves_gaps_where_runs_failed():
     rows = [row("a", 0.1, {"load": 1.0}, **contact(2)), row("a", None, {"load": 2.0}, status="failed")]
     rows += [row("a", 0.2, {"load": 3.0}, **contact(4)), row("reference", at={"load": 1.0}, **contact(1))]
@@ -382,29 +363,3 @@ def test_a_setting_that_does_not_last_is_named_beside_one_that_does():
         "The cheapest within 2 % is m (r = 4): 4 ms; where every finer setting has to hold it too, m (r = 8): 8 ms.",
         "The cheapest within 1 % is m (r = 4): 4 ms; where every finer setting has to hold it too, none.",
     )
-
-
-def test_budgets_without_methods_have_a_table(monkeypatch):
-    monkeypatch.setattr(study_report, "budget_figure", lambda values: Figure())  # drawn in test_budget.py
-    parts = [
-        {"cause": "contact law", "size": 0.1, "share": 0.8, "uncertainty": 1e-6},
-        {"cause": "modal truncation", "size": 0.04, "share": 0.204, "uncertainty": 1e-6},
-        {"cause": "time integration", "size": 1e-4, "share": -0.004, "uncertainty": 1e-6},
-    ]
-    whole = {"total": 0.12, "parts": parts, "explained": True}
-    values = {"windows": {"0.1": {"rigid": {"all": None}}, "0.3": {"rigid": {"all": whole}}}}
-    rows = [row("budget", at={"start.displacement": 0.02}), row("budget", at={"start.displacement": 0.05})]
-    rows += [row("budget", at={"start.displacement": 0.06}, status="failed", message="why")]
-    rows[:2] = [
-        replace(rows[0], values=values),
-        replace(rows[1], values={"windows": {"0.1": {"rigid": {"all": None}}}}),
-    ]
-    told = findings(result_of([], budgets=tuple(rows), methods=[]))
-    assert told["compared"][0].startswith("What causes the difference between the full and the reduced model?")
-    assert told["outcome"] == (
-        "In 1 of 3 error budgets the parts add up to the whole difference; the table below shows all.",
-    )
-    text = text_of(render_study(result_of([], budgets=tuple(rows[:1]), methods=[])))
-    parts = "contact law 80 %, modal truncation 20 %, time integration -0 %"
-    assert f"start.displacement = 0.02 rigid 0.3 s 12.0 % {parts} yes" in text
-    assert "rigid 0.1 s fewer than two of its models ran" in text

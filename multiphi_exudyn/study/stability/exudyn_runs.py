@@ -17,7 +17,7 @@ from multiphi_exudyn.errors import MultiPhiError
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.loads import FunctionLoad, HarmonicLoad, SampledLoad, SweepLoad
 from multiphi_exudyn.mechanics.structure import damping_matrix
-from multiphi_exudyn.study.measures.metrics import nrmse
+from multiphi_exudyn.study.measures import nrmse
 from multiphi_exudyn.study.stability.brute_force import highest_frequency
 from multiphi_exudyn.study.stability.case import STATIC_LOADS, Problem, Pull
 from multiphi_exudyn.study.stability.outcome import FAILED, NOT_RUN, OK, Outcome

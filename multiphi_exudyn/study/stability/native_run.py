@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from multiphi_exudyn.errors import MultiPhiError
-from multiphi_exudyn.study.running.timing import timed
+from multiphi_exudyn.study.runs import timed
 from multiphi_exudyn.study.stability.case import Case, Problem
 from multiphi_exudyn.study.stability.judgement import judge
 from multiphi_exudyn.study.stability.outcome import FAILED, OK, Outcome

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from multiphi_exudyn.study.comparison.pages import environment_of
-from multiphi_exudyn.study.comparison.wording import seconds
+from multiphi_exudyn.study.report import environment_of
 from multiphi_exudyn.study.stability import brute_force, exudyn_runs, judgement, run_laws
 from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
 from multiphi_exudyn.study.stability.summary import failures, headline, summaries, warned
+from multiphi_exudyn.study.wording import seconds
 
 __all__ = ["render_stability", "text_table"]
 
@@ -28,7 +28,7 @@ def text_table(results: Sequence[CaseResult]) -> str:
 
 def render_stability(results: Sequence[CaseResult], environment: dict[str, Any], quick: bool) -> str:
     """The page as HTML."""
-    page = environment_of(__package__ or "")
+    page = environment_of()
     page.filters["figure"] = _figure
     return page.get_template(TEMPLATE).render(
         results=results,

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from multiphi_exudyn.study.comparison.pages import sentences
+from multiphi_exudyn.study.report import sentences
 from multiphi_exudyn.study.stability.judgement import BEYOND
 from multiphi_exudyn.study.stability.outcome import FAILED, NOT_RUN, OK, CaseResult, Outcome
 from multiphi_exudyn.study.stability.run_laws import CLOSES
@@ -16,7 +16,7 @@ from multiphi_exudyn.time.model_warnings import grouped
 
 __all__ = ["contents", "failures", "headline", "summaries", "warned"]
 
-TEMPLATE = "headline.txt.j2"
+TEMPLATE = "stability_headline.txt.j2"
 STATUSES = (OK, FAILED, NOT_RUN)
 WORST = ("energy", "residual", "beyond", "difference")  # quantities whose largest value is shown
 LOCATED = ("energy", "difference")  # quantities shown with their case
@@ -77,7 +77,7 @@ def warned(results: Sequence[CaseResult]) -> list[str]:
 
 def headline(results: Sequence[CaseResult]) -> str:
     """The outcome in one sentence."""
-    (sentence,) = sentences(__package__ or "", TEMPLATE, ["outcome"], results=results)["outcome"]
+    (sentence,) = sentences(TEMPLATE, ["outcome"], results=results)["outcome"]
     return sentence
 
 
