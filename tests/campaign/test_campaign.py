@@ -146,6 +146,12 @@ def test_endless_impacts_end_with_all_that_they_move_at_rest(kind, number):
     assert judged(kind, number)[0] == [("ok", "")]
 
 
+@pytest.mark.parametrize("number", [3323, 4323])
+def test_elastic_bounces_that_friction_damps_come_to_rest(number):
+    """They went on at the size of round-off, as chatter."""
+    assert judged("lattice", number)[0] == [("ok", "")]
+
+
 def test_a_spring_falls_from_its_static_limit_and_sticks_again():
     """Brute force knew stick at the static limit and slip alone, of which neither was admissible, and gave up."""
     assert judged("contact friction", 162068)[0] == [("ok", "")]

@@ -187,3 +187,18 @@ def test_flexible_structures_strike_as_an_integrator_says(seed):
     assert_allclose([event.time for event in run.events if event.kind == "close"], times, rtol=1e-9)
     assert_allclose(run.displacement(2.0), state[:n], rtol=0, atol=1e-8)
     assert run.ledger.residual == pytest.approx(0.0, abs=1e-12 * run.ledger.initial)
+
+
+def test_an_elastic_contact_whose_friction_takes_a_share_of_every_bounce_comes_to_rest():
+    """e = 1, h = (1, 1), h_t = (0, 1), mu = 1: it lands as fast as it slides, and leaves with 2/3."""
+    body = mp.LinearStructure(np.eye(2), np.zeros((2, 2)), points={"x": 0, "y": 1})
+    floor = mp.UnilateralContact("floor", {"x": 1.0, "y": 1.0}, 0.0, restitution=1.0, friction=1.0, tangential="y")
+    weight = mp.ConstantLoad({"x": 1.0, "y": 1.0}, -5.0)
+    model = mp.MultiPhiModel(body, [floor], modes="all")
+    run = mp.simulate(model, 3.0, displacement=[0.5, 0.5], velocity=[0.3, 0.0], loads=[weight])
+    assert run.status == "ok"
+    third = [event.time for event in run.events if event.kind == "close"][2]
+    leaving = np.sum(run.velocity(third, "right"))
+    intervals = run.contact_intervals("floor")
+    assert intervals[-1] == pytest.approx([third + 2 * leaving / (10 * (1 - 2 / 3)), 3.0], rel=1e-9)
+    assert_lawful(run, [weight])

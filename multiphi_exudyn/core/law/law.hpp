@@ -192,6 +192,7 @@ class Law {
     bool has_rebounded(int touching) const;
     bool is_on_last_bounce(int element) const;
     double gap_velocity(const State& state, int touching) const;
+    double returned_share(int touching, double velocity) const;
     int begin_last_bounces();
     void mark_last_bounces();
 

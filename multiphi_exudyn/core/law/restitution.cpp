@@ -11,8 +11,9 @@
 // without restitution first, with impulses p, and then once more with at least e p (Poisson), H v+ >= 0, both times within
 // the cone of friction.
 //
-// A sequence of bounces with e < 1, s the speed at which the present one begins and a the acceleration of the gap back to
-// the stop, takes another 2 s / (a (1 - e)): as long as one bounce of speed s / (1 - e).
+// A sequence of bounces with e < 1, or with e = 1 beside friction that takes as much, s the speed at which the present one
+// begins and a the acceleration of the gap back to the stop, takes another 2 s / (a (1 - e)): as long as one bounce of speed
+// s / (1 - e).
 #include <algorithm>
 #include <cmath>
 
@@ -195,6 +196,13 @@ bool Law::has_rebounded(int touching) const {
     return model_->elements[contact].restitution > 0.0 && !is_on_last_bounce(contact) && impulses_[touching] > 0.0;
 }
 
+// The share of its velocity with which a struck contact leaves its stop: e, or less where friction takes a part at e = 1.
+double Law::returned_share(int touching, double velocity) const {
+    const double restitution = model_->elements[touching_[touching]].restitution;
+    const double arriving = -gap_velocity(released_, touching);
+    return restitution < 1.0 || !(arriving > 0.0) ? restitution : velocity / arriving;
+}
+
 // Begins the last bounce of contacts whose next bounce is too low or too short; how many. `acceleration_`: xi'' of
 // `struck_`. The last bounce takes as long as all bounces that would follow.
 int Law::begin_last_bounces() {
@@ -203,7 +211,7 @@ int Law::begin_last_bounces() {
     for (int k = 0; k < static_cast<int>(touching_.size()); ++k) {
         const int contact = touching_[k];
         const double* row = impact_.row(k);
-        const double restitution = model_->elements[contact].restitution, velocity = gap_velocity(struck_, k);
+        const double velocity = gap_velocity(struck_, k), restitution = returned_share(k, velocity);
         const bool may_end = has_rebounded(k) && restitution < 1.0 && !instant.begins_last_bounce[contact];
         wanted_[k] = 0.0;
         const double falling = -scalar_product(row, acceleration_.data(), struck_.level->width());
