@@ -24,7 +24,9 @@ import inspect
 import json
 import math
 import os
+import resource
 import runpy
+import signal
 import subprocess
 import sys
 import tempfile
@@ -38,6 +40,7 @@ AGREEMENT = 0.01
 SAMPLES = 200  # of a run
 FIELDS = ("script", "verdict", "error", "checked", "named", "told")
 NO_RUN = "no run"
+WAITING = 20  # times the processor time that a script may take, it may wait
 LONGEST = 5_000_000  # steps of a run of Exudyn: a minute of a small system
 FINER = (8, 64)  # times as many steps, where an error may be that of Exudyn's own run
 RENAMED = {"bodyOrNodeList": "itemNumbers", "bodyList": "bodyNumbers"}
@@ -67,7 +70,7 @@ def _arguments(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("folders", nargs="+", metavar="FOLDER")
     parser.add_argument("--only", nargs="*", help="names of scripts, all of the folders without it")
     parser.add_argument("--out", help="table of verdicts")
-    parser.add_argument("--seconds", type=float, default=60.0, help="that a script may take")
+    parser.add_argument("--seconds", type=float, default=60.0, help="of processor time that a script may take")
     return parser.parse_args(arguments)
 
 
@@ -75,12 +78,14 @@ def _judged(script: Path, seconds: float) -> dict[str, str]:
     """Verdict, error, whether an item is named, and what was told, by a process of its own."""
     with tempfile.TemporaryDirectory() as place:
         found = Path(place, "found.json")
-        call = [sys.executable, __file__, "--one", str(script), str(found)]
+        call = [sys.executable, __file__, "--one", str(script), str(found), str(seconds)]
+        told = f"not done within {seconds:g} s"
         try:
-            ended = subprocess.run(call, cwd=script.parent, capture_output=True, text=True, timeout=seconds)
-            told = (ended.stderr.strip().splitlines() or ["no dynamic run"])[-1]
+            ended = subprocess.run(call, cwd=script.parent, capture_output=True, text=True, timeout=WAITING * seconds)
+            if ended.returncode != -signal.SIGXCPU:
+                told = (ended.stderr.strip().splitlines() or ["no dynamic run"])[-1]
         except subprocess.TimeoutExpired:
-            told = f"not done within {seconds:g} s"
+            pass
         if found.exists():
             return dict(json.loads(found.read_text()))
     return {"verdict": NO_RUN, "error": "", "checked": "", "named": "", "told": told}
@@ -89,8 +94,10 @@ def _judged(script: Path, seconds: float) -> dict[str, str]:
 # ---------------------------------------------------------------------- in the process of one script
 
 
-def run_script(script: str, found: str) -> None:
-    """Run a script with SolveDynamic replaced by the comparison, after which the process ends."""
+def run_script(script: str, found: str, seconds: str) -> None:
+    """Run a script with SolveDynamic replaced by the comparison, after which the process ends; so it does too late."""
+    limit = math.ceil(float(seconds))
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, limit + 1))
     warnings.simplefilter("ignore")
     os.environ["MPLBACKEND"] = "Agg"
     import exudyn as exu

@@ -47,6 +47,10 @@ LIGHT = dict.fromkeys(KINDS, 3) | {
     "at events": 3,
     "dampers": 3,
     "digits": 3,
+    "free on damped stops": 0,
+    "slip at the stop": 0,
+    "spring across a floor": 0,
+    "cancelled spring": 0,
     "body statics": 0,
     "body unmatched": 0,
     "joints": 0,
@@ -58,24 +62,52 @@ def test_a_scene_of_every_kind_is_right(kind):
     assert [verdict for verdict, _ in judged(kind, LIGHT[kind])[0]] == ["ok"]
 
 
+HARD = [
+    ("sampled", 3, "a load falls in a millionth of the run: its terms are moved on, not made anew"),
+    ("moving stops", 11, "a level is first entered within an interval of a load"),
+    ("moving bases", 112, "the last step of a body in Exudyn ends under the load that the run ends with"),
+    ("moving redundant", 2062, "a dip is seen with shorter steps of brute force alone"),
+    ("rigid", 2176, "a body that passes its rest is not taken for one that somebody has moved"),
+    ("redundant", 412, "two stops at 1e-5 rad, one held, one struck: the held one is let go, however slowly"),
+    ("truncated", 3030, "an impulse that is round-off closes no contact"),
+    ("units", 6, "channels whose numbers outweigh the speeds of the structure hide no impact"),
+    ("lattice", 3323, "elastic bounces that friction damps come to rest"),
+    ("lattice", 4323, "the same beside a force law"),
+    ("lattice", 6708, "of two contacts at one place none pulls in their last bounce"),
+    ("friction", 210116, "resonance: the speed at a turn is round-off of what it has grown to"),
+    ("friction contacts", 210145, "a spring at its limit goes back for less than brute force looks ahead"),
+    ("friction free", 210145, "a spring at its limit that a block lets go gently: beyond it by round-off for long"),
+    ("friction free", 142102, "a free body that a load moves from rest is not taken for one that somebody has moved"),
+    ("friction impacts", 12108, "a rigid contact lets go of a block that turns, and which then sticks"),
+    ("friction impacts", 12038, "two blocks could fall from their static limits: the one that turns falls first"),
+    ("friction loads", 12146, "one block falls, which leaves the other within its static limit"),
+    ("friction loads", 1200025, "7 N, which would move it by 0.6 m, slip it by 3e-8 m: work is a difference of 4 J"),
+    ("friction units", 12123, "a block sticks along a stop: only the sum of their impulses is known"),
+    ("friction units", 20014, "in units of 2^40 s a speed is no round-off of a displacement"),
+    ("friction units", 150071, "impacts without end bring friction elsewhere to rest, within its static limit"),
+    ("friction redundant", 3020, "all slip accelerations cancel: round-off does not decide who sticks"),
+    ("friction redundant", 20003, "the same, without a spring"),
+    ("friction redundant", 450047, "of two at their limits but for round-off the one with a static limit sticks"),
+    ("contact friction", 162068, "a spring falls from its static limit and sticks again"),
+    ("rigid friction", 162141, "impacts without end bring a block elsewhere to rest, which all of them move"),
+    ("rigid friction", 190263, "a slip between bounces is shorter than they are"),
+    ("rigid friction", 227, "a contact sticks on its stop, with much friction, while another strikes"),
+    ("rigid friction", 271, "one that has just left its stop by less than can be seen is struck with the next"),
+    ("rigid friction", 665, "one is carried along by its belt while another slides"),
+]
+
+
+@pytest.mark.parametrize(("kind", "number", "why"), HARD, ids=[f"{kind} {number}" for kind, number, _ in HARD])
+def test_a_scene_that_was_hard_is_right(kind, number, why):
+    assert judged(kind, number)[0] == [("ok", "")], why
+
+
 def test_round_off_of_a_scene_at_rest_is_no_answer_that_processors_could_differ_in():
     """At its limit exactly, nothing moves: displacements are 1e-17."""
     found, (status, events, values) = judged("friction limits", 5000014)
     assert (found, status, events) == ([("ok", "")], "ok", 0)
     assert len(values) > 20
     assert not any(values)
-
-
-@pytest.mark.parametrize(
-    ("kind", "number"),
-    [
-        ("friction", 210116),  # resonance: the speed at a turn is round-off of what it has grown to
-        ("friction contacts", 210145),  # a spring at its limit goes back for less than the moment looked ahead
-        ("friction free", 210145),  # a spring at its limit that a block lets go gently: beyond it by round-off for long
-    ],
-)
-def test_brute_force_decides_what_turns_in_little_time(kind, number):
-    assert judged(kind, number)[0] == [("ok", "")]
 
 
 def test_what_friction_holds_does_not_move_but_for_round_off_of_the_forces_on_it():
@@ -94,74 +126,6 @@ def test_a_contact_that_closes_and_opens_at_once_has_been_struck():
     assert all(max(pair) > 1e-12 for pair in impulses.values() if len(pair) > 1)
 
 
-def test_an_impulse_that_is_round_off_closes_no_contact():
-    """On one kernel it did: the contact, told apart from one on which something presses, stayed open."""
-    assert judged("truncated", 3030)[0] == [("ok", "")]
-
-
-@pytest.mark.parametrize(
-    ("kind", "number"),
-    [
-        ("sampled", 3),  # a load that falls in a millionth of the run: its terms have to be moved on, not made anew
-        ("moving stops", 11),  # a level that is packed in the middle of a piece
-    ],
-)
-def test_channels_are_those_of_the_present_instant(kind, number):
-    assert judged(kind, number)[0] == [("ok", "")]
-
-
-def test_a_contact_that_an_impact_lets_go_slowly_is_let_go():
-    """Two rigid stops at 1e-5 rad, one held, one struck: held both, they pushed with 1e4 times the momentum."""
-    assert judged("redundant", 412)[0] == [("ok", "")]
-
-
-def test_the_last_step_of_a_body_ends_under_the_load_that_the_run_ends_with():
-    """Its time was rounded up to the end of the run, and there the function that moves the base was no more."""
-    assert [verdict for verdict, _ in judged("moving bases", 112)[0]] == ["ok"]
-
-
-def test_a_body_that_passes_its_rest_is_not_taken_for_one_that_somebody_has_moved():
-    """What the solver's iterations leave of a swing counts, not what they leave of the place where the run ends."""
-    assert [verdict for verdict, _ in judged("rigid", 2176)[0]] == ["ok"]
-
-
-def test_a_free_body_that_a_load_moves_from_rest_is_not_taken_for_one_that_somebody_has_moved():
-    """It swings by nothing, but goes far: what the solver's iterations leave of that way is no hand."""
-    assert judged("friction free", 142102)[0] == [("ok", "")]
-
-
-def test_a_dip_that_brute_force_steps_over_is_seen_with_shorter_steps():
-    assert [verdict for verdict, _ in judged("moving redundant", 2062)[0]] == ["ok"]
-
-
-@pytest.mark.parametrize(
-    ("kind", "number"),
-    [
-        ("rigid friction", 162141),  # a block elsewhere that every impact moves comes to rest as well
-        ("friction units", 150071),  # so does the friction of the other contact, which then holds up to a static limit
-    ],
-)
-def test_endless_impacts_end_with_all_that_they_move_at_rest(kind, number):
-    """Brute force ended those of the contacts alone: a slip too slow to be seen decided what followed."""
-    assert judged(kind, number)[0] == [("ok", "")]
-
-
-@pytest.mark.parametrize("number", [3323, 4323])
-def test_elastic_bounces_that_friction_damps_come_to_rest(number):
-    """They went on at the size of round-off, as chatter."""
-    assert judged("lattice", number)[0] == [("ok", "")]
-
-
-def test_a_spring_falls_from_its_static_limit_and_sticks_again():
-    """Brute force knew stick at the static limit and slip alone, of which neither was admissible, and gave up."""
-    assert judged("contact friction", 162068)[0] == [("ok", "")]
-
-
-def test_a_slip_between_bounces_may_be_shorter_than_they_are():
-    """Brute force looked no sooner than 6 ns after an impact, when the slip that it makes is over, and gave up."""
-    assert judged("rigid friction", 190263)[0] == [("ok", "")]
-
-
 @pytest.mark.parametrize(
     ("kind", "number", "verdict"),
     [
@@ -175,49 +139,6 @@ def test_a_run_may_differ_where_it_says_that_it_is_not_unique(monkeypatch, kind,
     found = [("failure: wrong", "another motion")], (0.0, 0.0)
     monkeypatch.setattr(campaign_judge, "_compared", lambda scene, motion: found)
     assert [said for said, _ in judged(kind, number)[0]] == [verdict]
-
-
-def test_a_load_whose_numbers_are_large_hides_no_impact():
-    """In other units the speeds of the channels outweigh those of the structure, of which an impact is judged."""
-    assert judged("units", 6)[0] == [("ok", "")]
-
-
-@pytest.mark.parametrize(
-    "number",
-    [
-        227,  # a contact that sticks on its stop, with much friction, while another strikes
-        271,  # one that has just left its stop by less than can be seen is struck with the next
-        665,  # one is carried along by its belt while another slides
-    ],
-)
-def test_rigid_contacts_that_rub_are_struck_together(number):
-    assert judged("rigid friction", number)[0] == [("ok", "")]
-
-
-@pytest.mark.parametrize(
-    ("kind", "number"),
-    [
-        ("friction impacts", 12108),  # a rigid contact lets go of a block that turns, and which then sticks
-        ("friction impacts", 12038),  # two blocks could fall from their static limits: the one that turns falls first
-        ("friction loads", 12146),  # one block falls, which leaves the other within its static limit
-        ("friction units", 12123),  # a block sticks along a stop: only the sum of their impulses is known
-        ("friction redundant", 3020),  # where all slip accelerations cancel: round-off of them decided who sticks
-        ("friction redundant", 20003),  # the same, without a spring
-        ("friction redundant", 450047),  # one at its limit but for round-off stuck, not the one with a static limit
-    ],
-)
-def test_blocks_are_decided_together(kind, number):
-    assert [verdict for verdict, _ in judged(kind, number)[0]] == ["ok"]
-
-
-def test_a_speed_is_no_round_off_of_a_place():
-    """In units of 2^40 s a block that slid was at rest: its speed was measured by the size of a place."""
-    assert judged("friction units", 20014)[0] == [("ok", "")]
-
-
-def test_a_ledger_has_the_round_off_of_loads_that_hardly_move_what_slips():
-    """7 N, which would move it by 0.6 m, slip it by 3e-8 m: its work is a difference of terms of 4 J."""
-    assert judged("friction loads", 1200025)[0] == [("ok", "")]
 
 
 def test_a_scene_comes_from_its_kind_and_number_alone():

@@ -191,9 +191,17 @@ bool Law::is_on_last_bounce(int element) const {
     return reached.phases[reached.level->first_guard(element)] == Phase::landing;
 }
 
+// Whether a contact has been struck and leaves its stop. Of those of one direction only some bear the impulse of all.
 bool Law::has_rebounded(int touching) const {
     const int contact = touching_[touching];
-    return model_->elements[contact].restitution > 0.0 && !is_on_last_bounce(contact) && impulses_[touching] > 0.0;
+    if (!(model_->elements[contact].restitution > 0.0) || is_on_last_bounce(contact)) return false;
+    const Matrix& rows = struck_.level->data().velocity_rows;
+    for (std::size_t k = 0; k < touching_.size(); ++k) {
+        const auto own = rows.row(contact), other = rows.row(touching_[k]);
+        const bool is_alike = own.dot(other) >= (1.0 - round_off::independent) * own.norm() * other.norm();
+        if (is_alike && impulses_[k] > 0.0) return true;
+    }
+    return false;
 }
 
 // The share of its velocity with which a struck contact leaves its stop: e, or less where friction takes a part at e = 1.
