@@ -144,8 +144,9 @@ void Mover::move(const State& displaced, const Transition& by_displacement, cons
         }
     }
     // Modes are orthogonal to round-off alone: every coordinate has that of the largest one, far from an equilibrium.
-    const double shared = round_off::product / round_off::zero * displaced.displacement.cwiseAbs().maxCoeff();
-    result.mapped_displacement.head(r).array() += shared;
+    const Vector& before = displaced.displacement;
+    const double largest = before.head(displaced.level->modes()).lpNorm<Eigen::Infinity>();
+    result.mapped_displacement.head(r).array() += round_off::product / round_off::zero * largest;
     map_scales(by_displacement.matrix, displaced.displacement_scale, displaced.mapped_displacement, r,
                result.mapped_displacement);
     map_scales(by_velocity.velocity_matrix, moving.velocity_scale, moving.mapped_velocity, r, result.mapped_velocity);
