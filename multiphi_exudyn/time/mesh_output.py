@@ -7,17 +7,17 @@ h lambda and -h_t T over the elements of the model.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
+from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import real_array
+from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.structure import LinearStructure
-
-if TYPE_CHECKING:
-    from multiphi_exudyn.time.trajectory import Trajectory
+from multiphi_exudyn.time.histories import Histories
 
 __all__ = ["contact_forces", "write_vtu"]
 
@@ -29,15 +29,17 @@ COLLECTION = """<?xml version="1.0"?>
 """
 
 
-def write_vtu(trajectory: Trajectory, path: str | Path, mesh: Any, dofs: np.ndarray, times: np.ndarray) -> list[Path]:
-    """Write the motion at times (k,) [s]; the arguments are those of ``Trajectory.to_vtu``."""
+def write_vtu(
+    motion: Histories, model: MultiPhiModel, path: str | Path, mesh: Any, dofs: np.ndarray, times: np.ndarray
+) -> list[Path]:
+    """Write a motion of a model at times (k,) [s]; the others are those of ``Trajectory.to_vtu``."""
     meshio, target = _meshio(), Path(path)
     if target.suffix != ".pvd":
         raise MultiPhiValueError(f"path: got {str(path)!r}, need a name that ends with .pvd")
     drawn = _as_mesh(meshio, mesh)
-    places = _places(trajectory.model.structure, dofs, len(drawn.points))
-    moved, speeds = trajectory.displacement(times), trajectory.velocity(times)
-    forces, files, listed = contact_forces(trajectory, times), list[Path](), list[str]()
+    places = _places(model.structure, dofs, len(drawn.points))
+    moved, speeds = motion.displacement(times), motion.velocity(times)
+    forces, files, listed = contact_forces(motion, model, times), list[Path](), list[str]()
     for k, t in enumerate(times.tolist()):
         file = target.with_name(f"{target.stem}_{k:0{len(str(len(times)))}d}.vtu")
         fields = {"displacement": moved, "velocity": speeds, "contact force": forces}
@@ -49,17 +51,17 @@ def write_vtu(trajectory: Trajectory, path: str | Path, mesh: Any, dofs: np.ndar
     return [target, *files]
 
 
-def contact_forces(trajectory: Trajectory, times: np.ndarray) -> np.ndarray:
+def contact_forces(motion: Histories, model: MultiPhiModel, times: np.ndarray) -> np.ndarray:
     """Forces (n, k) [N] that all contacts, frictions and force laws exert on the structure at times (k,)."""
-    structure, total = trajectory.model.structure, np.zeros((trajectory.model.structure.n, len(times)))
-    for element in trajectory.model.contacts:
+    structure, total = model.structure, np.zeros((model.structure.n, len(times)))
+    for element in model.contacts:
         if isinstance(element, Friction):
-            total -= np.outer(structure.row(element.direction), trajectory.friction_force(element.name, times))
+            total -= np.outer(structure.row(element.direction), motion.friction_force(element.name, times))
             continue
-        total += np.outer(structure.row(element.direction), trajectory.contact_force(element.name, times))
-        if element.name in trajectory.rubbing:
-            tangential = structure.row(element.tangential)
-            total -= np.outer(tangential, trajectory.friction_force(element.name, times))
+        total += np.outer(structure.row(element.direction), motion.contact_force(element.name, times))
+        if isinstance(element, UnilateralContact) and element.name in motion.rubbing:
+            assert element.tangential is not None, "friction has a direction"
+            total -= np.outer(structure.row(element.tangential), motion.friction_force(element.name, times))
     return total
 
 

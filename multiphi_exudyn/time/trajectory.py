@@ -254,7 +254,7 @@ class Trajectory(ModelHistories):
             For a mesh or degrees of freedom of another shape, and a time outside of the motion.
         """
         at = self._times(np.linspace(self.t_start, self.t_end, FRAMES) if times is None else times)
-        return write_vtu(self, path, mesh, dofs, at)
+        return write_vtu(self, self.model, path, mesh, dofs, at)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion to an .npz file without pickled objects, which ``load_trajectory`` reads.

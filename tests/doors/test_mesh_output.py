@@ -49,7 +49,7 @@ class TestFiles:
         structure = run.model.structure
         for t in (0.3, 1.5, 2.2, 5.0):
             left = structure.mass @ run.acceleration(t) + structure.stiffness @ run.displacement(t)
-            np.testing.assert_allclose(contact_forces(run, np.array([t]))[:, 0], left, atol=1e-11)
+            np.testing.assert_allclose(contact_forces(run, run.model, np.array([t]))[:, 0], left, atol=1e-11)
 
 
 class TestPoints:
