@@ -29,7 +29,8 @@ HEAVY = {
     "pandas": ("multiphi_exudyn/study", "multiphi_exudyn/time/histories.py"),
     "distributed": ("multiphi_exudyn/study/sweep.py",),
     "tqdm": (*(f"multiphi_exudyn/{room}" for room in ("mathematics", "time", "study", "cli")), "reference_models"),
-    "h5py", "meshio": ("multiphi_exudyn/mechanics/files.py",),
+    "h5py": ("multiphi_exudyn/mechanics/files.py",),
+    "meshio": ("multiphi_exudyn/time/mesh_output.py",),
     "pyyeti": ("multiphi_exudyn/mechanics/files.py",),
 }
 CORE = "multiphi_exudyn._core"
