@@ -34,6 +34,7 @@ __all__ = ["Motion", "core_start", "failure", "limits"]
 ACCUMULATED = 1e-6  # of the time so far: a window of events within it is chatter (core/run.cpp)
 EVENTS_PER_PERIOD = 20  # of the fastest mode or load, for each contact: more, over CHATTER_WINDOW, is chatter
 CHATTER_WINDOW = 200  # events, for each contact
+PASSES_PER_PERIOD, PASSES_IN_WINDOW = 2, 20  # of every knot of a force law: an oscillation passes it twice
 
 
 class Motion:
@@ -223,8 +224,9 @@ def limits(model: MultiPhiModel) -> tuple[int, float]:
     """Window of the chatter check [events], and largest number of events in a period of the highest mode or load.
 
     Both grow with the number of contacts: stops side by side are all struck in a small part of a period, once each.
-    An oscillation passes every knot of a force law twice.
+    They grow with that of knots: a law of many, close to each other, passes them all in a small part of a period.
     """
     contacts = max(1, len(model.contacts) - len(model.force_laws))  # that are no force laws
     knots = sum(law.levels for law in model.force_laws)
-    return CHATTER_WINDOW * contacts, EVENTS_PER_PERIOD * contacts + 2 * knots
+    window = CHATTER_WINDOW * contacts + PASSES_IN_WINDOW * knots
+    return window, EVENTS_PER_PERIOD * contacts + PASSES_PER_PERIOD * knots

@@ -54,6 +54,10 @@ LIGHT = dict.fromkeys(KINDS, 3) | {
     "body statics": 0,
     "body unmatched": 0,
     "joints": 0,
+    "racks": 0,
+    "strings": 0,
+    "knots": 0,
+    "landings": 0,
 }  # quick ones in which something happens; random_campaign.py runs many
 
 

@@ -2,9 +2,20 @@
 
 import numpy as np
 import pytest
+from campaign_scenes import scene_of
 from small_structures import chain, stop
 
-from multiphi_exudyn import Friction, HarmonicLoad, LinearStructure, MultiPhiModel, SampledLoad, simulate
+from multiphi_exudyn import (
+    ForceLaw,
+    Friction,
+    HarmonicLoad,
+    LinearStructure,
+    MultiPhiModel,
+    SampledLoad,
+    UnilateralContact,
+    simulate,
+)
+from multiphi_exudyn.study.stability.law_check import broken_laws
 
 
 def test_samples_of_a_load_are_no_events():
@@ -35,3 +46,48 @@ def test_friction_may_follow_a_load_that_is_faster_than_every_mode(load):
     run = simulate(model, SWINGS / 5, loads=[load])
     assert run.status == "ok", run.message
     assert len(run.events) >= 3.9 * SWINGS
+
+
+def run_of(kind, number):
+    """The run of a scene of the campaign, and the laws that it breaks."""
+    scene = scene_of(kind, number)
+    run = simulate(scene.model, scene.t_end, scene.displacement, scene.velocity, scene.loads)
+    return run, broken_laws(run, scene.loads, (scene.displacement, scene.velocity))
+
+
+@pytest.mark.parametrize(
+    "number",
+    [
+        *(3, 25, 37),  # contacts that truncation has left inside their stops are missing where all could carry
+        *(46, 112, 140),  # one of them is struck by what truncation makes of a velocity that is zero, and opens again
+    ],
+)
+def test_a_truncated_pipe_comes_to_rest_on_its_racks(number):
+    run, broken = run_of("racks", number)
+    assert run.status == "ok", run.message
+    assert not broken
+    assert len(run.events) < 5000
+
+
+@pytest.mark.parametrize(("count", "gap"), [(12, 0.1), (16, 0.1), (17, 0.55), (20, 0.1), (24, 0.25), (32, 0.1)])
+def test_contacts_that_open_together_by_symmetry(count, gap):
+    """A string of all its modes, plucked in the middle above stops that it touches in pairs."""
+    k = np.arange(1, count)
+    plucked = 8 / np.pi**2 / k**2 * np.sin(k * np.pi / 2) / np.sqrt(2)
+    points = {f"p{j}": np.sqrt(2) * np.sin(k * np.pi * j / count) for j in range(1, count)}
+    string = LinearStructure(np.eye(count - 1), np.diag((np.pi * k) ** 2), points=points)
+    stops = [UnilateralContact(f"c{j}", f"p{j}", gap) for j in range(1, count)]
+    run = simulate(MultiPhiModel(string, stops, modes="all"), 4.0, displacement=plucked)
+    assert run.status == "ok", run.message
+
+
+def test_a_law_of_many_knots_is_passed_in_a_moment():
+    """300 knots in a band that the mass crosses in a thousandth of a period, to and fro."""
+    inner = 1e-3 * np.linspace(-1, 1, 300)
+    knots = np.r_[-1.0, inner, 1.0]
+    law = ForceLaw("m", (knots, np.interp(knots, inner, np.tanh(3e3 * inner)) + knots), name="law")
+    mass = LinearStructure([[1.0]], [[1.0]], points={"m": 0})
+    run = simulate(MultiPhiModel(mass, [law], modes="all"), 20.0, velocity=[0.5])
+    assert run.status == "ok", run.message
+    assert len(run.events) > 1800
+    assert abs(run.ledger.residual) < 1e-9 * run.ledger.initial

@@ -192,7 +192,7 @@ void Law::apply_requests(Requests& requests) {
     for (int i = 0; i < count; ++i) {
         const Element& element = model_->elements[i];
         const int state = instant.trial.level->state(i), stick = element.stick.state;
-        striking_[i] = element.is_rigid() && instant.treated[i] && state == open_state;
+        striking_[i] = element.is_rigid() && state == open_state && (instant.treated[i] || is_inside(instant.trial, i));
         any_strikes = any_strikes || (striking_[i] && requests[i] != no_request);
         int requested = requests[i] == no_request ? state : requests[i];
         if (element.stick.spring > 0.0 && state == stick && requested > stick)
@@ -213,7 +213,9 @@ void Law::apply_requests(Requests& requests) {
     for (int i = 0; i < count; ++i)
         if (follows_impact(requests, i)) instant.treated[i] = 0;
     strike();
-    if (instant.changes.size() == before) {
+    const bool is_in_vain = entered_.level == instant.trial.level && come_inside(requests);
+    if (instant.changes.size() == before || is_in_vain) {
+        instant.changes.resize(before);
         instant.transition_loss = Loss();
         close_without_impact(requests);
         return;

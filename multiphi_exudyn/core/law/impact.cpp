@@ -25,7 +25,8 @@ double negligible_velocity(const State& state, int contact, const double* row, c
         size += std::abs(data.gap_rows(contact, i)) * std::abs(state.displacement[i]);
         falling -= row[i] * acceleration[i];
     }
-    return falling > 0.0 ? std::sqrt(2.0 * round_off::zero * size * falling) : 0.0;
+    const double height = std::max(round_off::zero * size, -gap(state, contact));
+    return falling > 0.0 ? std::sqrt(2.0 * height * falling) : 0.0;
 }
 
 double resting_size(const Vector& one, const Vector& other, const double* row) {

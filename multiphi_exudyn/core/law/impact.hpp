@@ -23,7 +23,8 @@ inline constexpr double immovable = 1e-11;  // of a contact's mobility: below it
 // Size of a gap velocity (a row over xi') at the velocities of a state, whose directions an impact mixes.
 double velocity_size(const State& state, const double* row);
 
-// The largest gap velocity that the free motion reverses before the gap is more than round-off; xi'' of the state given.
+// The largest gap velocity that the free motion reverses before the gap is above zero by more than round-off; xi'' of the
+// state given.
 double negligible_velocity(const State& state, int contact, const double* row, const Vector& acceleration);
 
 // The sum of the terms of a gap's acceleration, with the larger one of two states' sizes.

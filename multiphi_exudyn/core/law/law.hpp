@@ -85,10 +85,13 @@ class Law {
     // the level in which all of them are open: first Moreau's impact, then complementarity of acceleration and reaction.
     // A contact closes only if its reaction in the level entered is >= 0. A contact counts as at rest at its stop also
     // if its free motion brings it back before its gap is more than round-off: this ends a sequence of ever smaller
-    // bounces. A contact whose gap the closed contacts already fix stays open at its stop, without a force: of redundant
+    // bounces. A contact that truncation has left inside its stop touches it too: with others at their stops it closes
+    // as soon as it is at rest there, and none of them is missing where all can carry. A contact whose gap the closed contacts already fix stays open at its stop, without a force: of redundant
     // contacts an independent set carries all forces, of those that close together the roughest ones.
     void strike();
     void close_without_impact(const Requests& requests);
+    static bool is_inside(const State& state, int contact);
+    bool come_inside(const Requests& requests) const;
     int find_pressed();
     std::size_t list_resting(bool unseen);
     void solve_resting_forces();
@@ -123,7 +126,9 @@ class Law {
     // 6. A contact that may not make the change it requests is *refused*: it keeps its state until s has risen to zero
     // (then it is armed), or until s in the level it would enter has risen to zero (then it changes). If it would then
     // repeat its request at the same instant, alone or in turn with others, it is *held back* until s has risen to zero,
-    // or until another contact requests a change at a later instant, or changes.
+    // or until another contact requests a change at a later instant, or changes. An impact of contacts that come inside
+    // their stops, after which all are as they were, does not take place, as it would be repeated without end: they close
+    // without it, or are refused.
     void update_phases(State& state, const Flags* refused);
     void hold_back(State& state);
     void arm_return_guards();

@@ -72,6 +72,22 @@ void Law::slip_after_impact() {
     entered_ = candidate_;
 }
 
+// Whether truncation has left an open contact inside its stop in a state: it recovers, or is refused.
+bool Law::is_inside(const State& state, int contact) {
+    if (!state.level || state.level->state(contact) != open_state) return false;
+    const Phase phase = state.phases[state.level->first_guard(contact)];
+    return phase != Phase::armed && phase != Phase::landing;
+}
+
+// Whether all rigid contacts that request to close come to the instant inside their stops, none of them with restitution.
+bool Law::come_inside(const Requests& requests) const {
+    for (int i = 0; i < model_->size(); ++i)
+        if (striking_[i] && requests[i] != no_request &&
+            (!is_inside(instant.reached, i) || model_->elements[i].restitution > 0.0))
+            return false;
+    return true;
+}
+
 // Closes rigid contacts without an impact if the level entered gives them a reaction, else refuses them.
 void Law::close_without_impact(const Requests& requests) {
     const Level& level = *instant.trial.level;
