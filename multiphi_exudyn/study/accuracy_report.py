@@ -225,7 +225,7 @@ def _loads(result: StudyResult) -> list[float]:
     return [load for load in given if load is not None]
 
 
-MARKERS = ("o", "D", "^", "v", "<", ">", "p", "h")
+MARKERS = ("o", "D", "^", "v", "<", ">", "p", "h", "*")  # one more than colours: no two methods look alike
 FULL_COLOURS, FULL_MARKERS = (BLACK, FULL, "#4D4D4D"), ("s", "d", "X")
 MOST_ORDERS = 5  # written one by one
 MOST_TICKS = 10
