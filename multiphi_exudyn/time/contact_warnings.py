@@ -262,9 +262,9 @@ def _backward_slip(segments: Record) -> Iterator[str]:
     for i, element in enumerate(contacts):
         sticks = friction_spring(element)[0]
         slips = np.array([level.states[i] > sticks for level in segments.levels])[segments.numbers]
-        if sticks < 0 or np.sum(durations[slips & ~segments.settled]) <= BACKWARDS * np.sum(durations[slips]):
+        if sticks < 0 or np.sum(durations[slips & ~segments.all_armed]) <= BACKWARDS * np.sum(durations[slips]):
             continue
-        places = np.flatnonzero(slips & ~segments.settled)
+        places = np.flatnonzero(slips & ~segments.all_armed)
         speeds = segments.values(middles[places], "right", functools.partial(_slip_row, i, sticks))
         against = places[speeds < -SPEED_ROUND_OFF * np.max(np.abs(speeds))]
         share = float(np.sum(durations[against]) / np.sum(durations[slips]))

@@ -27,7 +27,7 @@ NUMBERS = {phase: number for number, phase in enumerate(PHASES)}
 class Statistics(NamedTuple):
     """Work of a run; function_evaluations counts samples of event signals.
 
-    record_bytes: memory of its segments and events; array_bytes: of the levels, maps and loads of the loop, which runs
+    record_bytes: memory of its segments and events; array_bytes: of the levels, maps and loads of the core, which runs
     of one model under the same loads share.
     """
 

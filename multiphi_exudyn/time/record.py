@@ -79,7 +79,7 @@ class Record(Segments):
         return [self.loaded.level(states) for states in self.visited]
 
     @functools.cached_property
-    def settled(self) -> np.ndarray:
+    def all_armed(self) -> np.ndarray:
         """Whether (n,) every guard is armed at the start of a segment: then no signal is below zero in it."""
         return np.asarray(self.trajectory.all_armed)[: len(self)].astype(bool)
 

@@ -56,7 +56,7 @@ more only where they are small beside what the loads could give, of which ROUND_
 longer than the run and than the mode moves one way. A wrong force or a wrong impulse opens the ledger by its whole
 work. OPEN lies far from both.
 
-The loop balances its sums when a run ends; only where it finds them open, or has left works out, the
+The core balances its sums when a run ends; only where it finds them open, or has left works out, the
 ledger is made.
 """
 
@@ -96,7 +96,7 @@ from multiphi_exudyn.time.model_warnings import (
 )
 from multiphi_exudyn.time.segments import Segments
 from multiphi_exudyn.time.trajectory import Trajectory
-from multiphi_exudyn.time.truncation import energy_warning, truncation_warnings, verdict_of
+from multiphi_exudyn.time.truncation import energy_warning, truncation_estimate, truncation_warnings
 
 __all__ = ["FarRest", "ModelWarnings", "RunSummary", "ledger_warnings", "warnings_of", "warnings_of_body"]
 
@@ -133,7 +133,7 @@ def warnings_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> t
         after = (*mesh_warnings(trajectory, general.spread), *after)
     share, error = record.truncation.energy_share, record.truncation.motion
     if tolerance is not None or not (share >= 0 and error >= 0):
-        share, error = verdict_of(trajectory, tolerance)
+        share, error = truncation_estimate(trajectory, tolerance)
     if tolerance is None and not (share > 0 or error > 0):
         return (*before, *after)
     struck = general.rigid and error > 0 and _struck(trajectory)

@@ -27,7 +27,7 @@ open level, to which it comes back. At the start it is the static residual of th
 level d and w / Omega are linear in the state before and in the changes beside the map of the levels
 (transitions/defect_forms.py); the triangular factors of these maps are kept, a few numbers per pair of levels.
 
-Truncation warnings: sentences on energy and motion lost to truncation, from the verdict of a run.
+Truncation warnings: sentences on energy and motion lost to truncation, from the estimate of a run.
 """
 
 from __future__ import annotations
@@ -64,9 +64,9 @@ __all__ = [
     "indicator_threshold",
     "run_with_enough_modes",
     "total_defect",
+    "truncation_estimate",
     "truncation_indicator",
     "truncation_warnings",
-    "verdict_of",
 ]
 
 APART = 1.5  # times as many modes has a run by which another one is judged
@@ -287,9 +287,9 @@ class DefectHistory:
 
 
 def total_defect(trajectory: Trajectory) -> float:
-    """Sum of |defect|^2 [m2 kg] over the segments of a run, from the loop where it has summed them."""
-    from_loop = trajectory.ending.record.truncation.defects
-    return float(np.sum(DefectHistory.of(trajectory).squares)) if math.isnan(from_loop) else from_loop
+    """Sum of |defect|^2 [m2 kg] over the segments of a run, from the run where it has summed them."""
+    summed = trajectory.ending.record.truncation.defects
+    return float(np.sum(DefectHistory.of(trajectory).squares)) if math.isnan(summed) else summed
 
 
 def _at_start(trajectory: Trajectory, level: LoadedLevel, stopped: tuple[int, ...], state: np.ndarray) -> float:
@@ -335,8 +335,8 @@ def indicator_threshold(tolerance: Tolerance | None) -> float:
     return INDICATOR if tolerance is None else min(INDICATOR, tolerance.error)
 
 
-def verdict_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[float, float]:
-    """Verdict on a run for which the loop could not compute it, or used another limit.
+def truncation_estimate(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tuple[float, float]:
+    """Estimate of what a run has lost, for one that could not compute it, or used another limit.
 
     tolerance: the one that decided the modes.
     """
@@ -354,10 +354,10 @@ def verdict_of(trajectory: Trajectory, tolerance: Tolerance | None = None) -> tu
 
 
 def truncation_warnings(
-    model: MultiPhiModel, verdict: tuple[float, float], tolerance: Tolerance | None, struck: bool
+    model: MultiPhiModel, estimate: tuple[float, float], tolerance: Tolerance | None, struck: bool
 ) -> tuple[str, ...]:
     """One warning of motion and energy lost to truncation, or none; struck: whether a rigid contact was struck."""
-    share, error = verdict
+    share, error = estimate
     if tolerance is not None and (told := _of_tolerance(model, share, error, tolerance)):
         return (told,)
     return _sentence(share, error, struck)
@@ -381,7 +381,7 @@ def _of_tolerance(model: MultiPhiModel, share: float, error: float, tolerance: T
 
 
 def _sentence(share: float, error: float, struck: bool) -> tuple[str, ...]:
-    """One warning of a verdict on a run whose modes no tolerance has decided: of its motion, else of its energy.
+    """One warning of the estimate of a run whose modes no tolerance has decided: of its motion, else of its energy.
 
     The estimated error of motion is on average four times the true one where a rigid contact was struck.
     """

@@ -40,24 +40,6 @@ class TestPoints:
         refused(ValueError, begins, structure, points={"tip": place})
 
 
-class TestTable:
-    @pytest.mark.parametrize(
-        ("kind", "rows", "begins"),
-        [
-            (ValueError, ROWS[:-1], "dofs: got 5 rows, need 6 as the mass has"),
-            (ValueError, [*ROWS[:-1], ROWS[0]], "dofs: got (1, 'ux') twice, need"),
-            (ValueError, [*ROWS[:-1], (9, "w")], "dofs[5]: got component 'w'"),
-            (ValueError, [*ROWS[:-1], (9, 3, 1)], "dofs[5]: got (9, 3, 1), need"),
-            (TypeError, [*ROWS[:-1], 9], "dofs[5]: got 9, need"),
-            (TypeError, [*ROWS[:-1], "9z"], "dofs[5]: got '9z', need"),
-            (TypeError, "rows.txt", "dofs: got str, need"),
-            (TypeError, 3, "dofs: got int, need"),
-        ],
-    )
-    def test_refuses(self, refused, kind, rows, begins):
-        refused(kind, begins, structure, dofs=rows)
-
-
 class TestFixed:
     @pytest.mark.parametrize("kind", KINDS)
     def test_matrices_points_and_table_keep_their_numbering(self, kind):

@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 import math
-import pickle
 import warnings
 from dataclasses import replace
 from unittest import mock
@@ -120,18 +119,6 @@ class TestTruncation:
         assert len(run.events) > 5
         assert run.warnings == ()
 
-    @pytest.mark.parametrize("loads", [(), (mp.ConstantLoad("node3", 0.2),)], ids=["free", "static"])
-    @pytest.mark.parametrize("stiffness", [1e6, math.inf])
-    def test_a_run_is_told_the_same_whatever_has_run_before(self, stiffness, loads):
-        """Of its own model the first one is sampled; others are looked at on their way, and told what was kept."""
-        model, start = rig(stiffness)
-        shared, starts = dataclasses.replace(model, modes=6), [f * start for f in (1.0, 0.8, 1.3, 1.0, 1.3, 0.02)]
-        found = [mp.simulate(shared, END, displacement=x, loads=loads).warnings for x in starts]
-        own = [dataclasses.replace(model, modes=6) for _ in starts]
-        runs = zip(own, starts, strict=True)
-        assert found == [mp.simulate(one, END, displacement=x, loads=loads).warnings for one, x in runs]
-        assert len(set(found)) > 2
-
 
 class TestSlowModel:
     def test_mass_and_stiffness_in_the_wrong_order_are_said(self):
@@ -207,25 +194,6 @@ class TestHorizon:
             assert np.all(run.at("m", np.linspace(0, 40.0, 101)) == 0.0)
             assert 20 / rate < run.horizon() < 32 / rate
 
-    def test_balls_that_touch_are_not_determined(self):
-        balls = mp.LinearStructure(np.eye(4), np.zeros((4, 4)), None, {f"b{i}": i for i in range(4)})
-        touching = [
-            mp.UnilateralContact(f"c{i}", {f"b{i + 1}": 1.0, f"b{i}": -1.0}, 0.1 * (i == 0), restitution=0.9)
-            for i in range(3)
-        ]
-        run = mp.simulate(mp.MultiPhiModel(balls, touching), 1.0, velocity=[1.0, 0.0, 0.0, 0.0])
-        assert 0.1 <= run.horizon() < 0.2
-
-    def test_of_what_damping_takes_from_the_motion_gaps_tell(self):
-        """A tilt of the start is gone before the bar strikes; one of the stops is not."""
-        feet = {"y": 0, "phi": 1, "l": np.array([1.0, -0.5]), "r": np.array([1.0, 0.5])}
-        bar = mp.LinearStructure(np.diag([1.0, 0.1]), np.diag([0.0, 0.1]), np.diag([0.0, 20.0]), feet)
-        stops = [mp.UnilateralContact(foot, foot, 0.0, restitution=0.5) for foot in ("l", "r")]
-        run = mp.simulate(
-            mp.MultiPhiModel(bar, stops), 0.6, displacement=[0.5, 0.0], loads=[mp.ConstantLoad("y", -9.81)]
-        )
-        assert run.horizon(1e-5) < 0.6
-
     def test_sensitive_motion_parts_the_later_the_larger_the_tolerance(self):
         walls = [stop("m0", 0.05, 1e4, name="below"), mp.UnilateralContact("above", {"m2": -1.0}, 0.05, 1e4)]
         run = mp.simulate(mp.MultiPhiModel(chain(3), walls, modes="all"), 400.0, velocity=np.array([1.0, -0.3, 0.7]))
@@ -237,11 +205,6 @@ class TestHorizon:
     def test_a_tolerance_is_a_number_between_0_and_1(self, tolerance):
         with pytest.raises(mp.MultiPhiValueError, match="tolerance: got"):
             mp.simulate(mp.MultiPhiModel(chain(1)), 1.0).horizon(tolerance)
-
-    def test_it_is_the_same_for_a_pickled_run_and_for_loads(self):
-        model = mp.MultiPhiModel(chain(3), [stop("m0", 0.1, 30.0)], modes="all")
-        run = mp.simulate(model, 30.0, loads=[mp.ConstantLoad("m2", -1.0)])
-        assert pickle.loads(pickle.dumps(run)).horizon(1e-3) == run.horizon(1e-3)
 
 
 @pytest.mark.parametrize("kind", ["compliant", "rigid", "mixed"])
@@ -398,23 +361,6 @@ class TestOpenLedger:
         monkeypatch.setattr(mp.Trajectory, "ledger", replace(given, **{row: -1e-14 * gift, "final": closed.final}))
         assert ("open ledger" in "".join(warnings_of(run))) == (getattr(closed, row) > 0)
 
-    @pytest.mark.parametrize(("part", "place"), [("at_events", 0), ("at_start", 5), ("works", 0), ("works", 2)])
-    def test_the_core_finds_a_row_that_gives(self, part, place):
-        """Impacts, friction at the start, and the works of damping and of friction."""
-        ledger = self.run().ending.ledger
-        energy = ledger.start_energy + ledger.start_potential
-        final = energy - ledger.works.damping
-        assert core.is_balanced(ledger, final)
-        row = dict.fromkeys(("at_start", "at_events", "works"), 0) | {"at_events": 6, "works": 12}
-        for share, balanced in ((1e-2, False), (1e-9, True)):
-            numbers = np.frombuffer(ledger.__getstate__()).copy()
-            gift = share * energy + numbers[row[part] + place]
-            numbers[row[part] + place] -= gift
-            changed = core.Ledger.__new__(core.Ledger)
-            changed.__setstate__(numbers.tobytes())
-            assert core.is_balanced(changed, final + gift) == balanced
-            assert core.is_balanced(ledger, final + share * energy) == balanced
-
 
 class TestMeshImpacts:
     """A clamped bar of unit length, mass and stiffness before a rigid stop, pulled and let go: energy is not lost."""
@@ -461,33 +407,3 @@ class TestMeshImpacts:
         (told,) = (sentence for sentence in run.warnings if sentence.startswith("mesh impacts: "))
         assert f"{100 * run.ledger.impact / run.ledger.initial:.2g} % of the largest energy" in told
         assert error > 0.05
-
-    @pytest.mark.parametrize("masses", [1, 2, 3, 5, 6, 20])
-    def test_of_lumped_masses_are_their_own(self, masses):
-        run, _ = self.run(
-            mp.LinearStructure(np.eye(masses) / masses**2, chain(masses, ends=1).stiffness, None, {"tip": masses - 1}),
-            3,
-            start=np.linspace(-3.0, -4.0, masses),
-        )
-        assert run.ledger.impact > 0.01 * run.ledger.initial
-        assert run.warnings == ()
-
-
-@pytest.mark.parametrize("error", [1.0, 0.3])
-def test_after_a_tolerance_another_remedy_is_told_than_a_tolerance(error):
-    """Alone and among many; without one it is the remedy."""
-
-    def warned(modes):
-        start = 3e-3 * np.arange(18.0)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            alone = mp.simulate(long_chain(modes), 0.5, displacement=start).warnings
-            many = mp.simulate_many(long_chain(modes), 0.5, np.array([start, start])).warnings
-        assert list(many) == [alone, alone]
-        return " ".join(alone)
-
-    tolerant = warned(mp.Tolerance(error))
-    assert "truncated contact" in tolerant
-    assert "modes=Tolerance" not in tolerant
-    assert f"give Tolerance an error below {error:g}" in tolerant
-    assert "or modes=Tolerance(0.01)" in warned(4)

@@ -5,8 +5,6 @@ import math
 import numpy as np
 import pytest
 import scipy.sparse
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
@@ -55,12 +53,6 @@ class TestMatrices:
     def test_refuses(self, refused, which, case):
         kind, matrix = BAD_MATRICES[case]
         refused(kind, f"{which}: ", structure, **{which: matrix})
-
-    @pytest.mark.parametrize("kind", [np.asarray, scipy.sparse.csr_array])
-    def test_says_which_entries_are_asymmetric_and_by_how_much(self, refused, kind):
-        matrix = kind(changed(STIFFNESS, 0, 1, -1.3))
-        begins = "stiffness: got -1.3 at (0, 1) and -1 at (1, 0), 0.1 of its largest entry apart"
-        refused(ValueError, begins, structure, stiffness=matrix)
 
     @pytest.mark.parametrize(("diagonal", "beside"), [(1.0, 2.0), (1.0, 1.0), (0.0, 0.0)])
     def test_refuses_a_mass_that_is_not_positive_definite(self, refused, diagonal, beside):
@@ -163,13 +155,3 @@ class TestDamping:
         assert_array_equal(damping.of(4), [0.04, 0.02, 0.001, 0.001])
         assert_array_equal(damping.of(1), [0.04])
         assert_array_equal(damping.of(0), [])
-
-
-class TestProperties:
-    @given(st.integers(0, 3), st.integers(0, 3), st.sampled_from(["mass", "stiffness"]), st.booleans())
-    def test_one_value_that_is_not_finite_anywhere_is_found(self, refused, i, j, which, sparse):
-        matrices = {"mass": np.eye(4), "stiffness": np.eye(4)}
-        matrices[which] = changed(changed(np.eye(4), i, j, math.nan), j, i, math.nan)
-        if sparse:
-            matrices[which] = scipy.sparse.csr_array(matrices[which])
-        refused(ValueError, f"{which}: got a value that is NaN", LinearStructure, **matrices)

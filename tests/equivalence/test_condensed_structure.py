@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.sparse
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 import multiphi_exudyn as mp
 
@@ -49,17 +49,6 @@ class TestFrequencies:
         frequencies = mp.MultiPhiModel(built, modes="all").level(()).frequencies
         assert_allclose(frequencies, finite_frequencies(mass, stiffness), rtol=1e-8)
 
-    @pytest.mark.parametrize("kind", KINDS)
-    def test_rows_of_zeros_and_supports(self, kind):
-        mass, stiffness = np.diag([1.0, 0.0, 2.0, 0.0, 1.0]), 1e4 * (2 * np.eye(5) - np.eye(5, k=1) - np.eye(5, k=-1))
-        built = mp.condensed_structure(KINDS[kind](mass), KINDS[kind](stiffness), fixed=[0], points={"end": 4})
-        assert_array_equal(built.massless, [1, 3])
-        assert_array_equal(built.free, [2, 4])
-        assert_allclose(
-            mp.MultiPhiModel(built).level(()).frequencies, finite_frequencies(mass[1:, 1:], stiffness[1:, 1:])
-        )
-        assert_allclose(built.full(np.array([0.0, 1.0])), [0, 0, 0, 0.5, 1], atol=1e-15)  # row 3 between 2 and 4
-
 
 class TestPoints:
     @pytest.mark.parametrize("at", [0, 1])
@@ -87,37 +76,6 @@ class TestPoints:
         )
         t = np.linspace(0, 0.02, 401)
         assert_allclose(run.at("mass", t), exact.at("mass", t), atol=1e-3 * np.max(np.abs(exact.at("mass", t))))
-
-    @pytest.mark.parametrize("kind", KINDS)
-    @pytest.mark.parametrize("supports", [[], [0]])
-    @pytest.mark.parametrize("local", [True, False])
-    def test_as_many_coordinates_as_rows_are_these_rows(self, kind, supports, local):
-        """A displacement of all rows is what it says, and one of the masses alone is told by ``condensed``."""
-        rng = np.random.default_rng(5)
-        mass, stiffness = random_problem(rng, 7, 2, local)
-        if supports:
-            mass, stiffness = (scipy.linalg.block_diag([[1.0]], m) for m in (mass, stiffness))
-        n = len(mass)
-        points = {"a": rng.standard_normal(n), "b": n - 1, "c": n - 2}
-        built = mp.condensed_structure(KINDS[kind](mass), KINDS[kind](stiffness), points=points, fixed=supports)
-        kept = np.setdiff1d(np.arange(n), supports)
-        assert_array_equal(built.free, kept)
-        x = rng.standard_normal(len(kept))
-        assert_array_equal(built.full(x)[kept], x)
-        row = np.zeros(n) + np.eye(n)[n - 1]
-        assert_array_equal(built.row("b"), row[kept])
-        frequencies = mp.MultiPhiModel(built, modes="all").level(()).frequencies
-        exact = finite_frequencies(mass[np.ix_(kept, kept)], stiffness[np.ix_(kept, kept)])
-        assert_allclose(frequencies[: len(exact)], exact, rtol=1e-6)
-        assert frequencies[len(exact)] > 100 * exact[-1]
-        y = np.zeros(n)
-        y[kept] = x
-        still = built.condensed(y)
-        motions = built.motions.toarray()[kept]
-        forces = motions.T @ stiffness[np.ix_(kept, kept)] @ still
-        sizes = np.abs(motions).T @ np.abs(stiffness[np.ix_(kept, kept)]) @ np.abs(still)
-        assert np.all(np.abs(forces) < 1e-9 * sizes)
-        assert_allclose(mass[np.ix_(kept, kept)] @ still, mass[np.ix_(kept, kept)] @ x, rtol=1e-7)
 
 
 class TestDamping:

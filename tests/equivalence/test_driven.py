@@ -54,19 +54,10 @@ class TestAgainstAnIntegratorAt1e12:
         load = mp.HarmonicLoad("m1", 2.0, omega / (2 * math.pi))
         self.check(damping, [load], lambda t: 2 * math.cos(omega * t), 1e-10)
 
-    def test_sampled(self, damping):
-        times, forces = np.linspace(0.0, 7.5, 31), np.random.default_rng(0).normal(size=31)
-        load = mp.SampledLoad("m1", times, forces)
-        self.check(damping, [load], lambda t: np.interp(t, times, forces, right=0.0), 1e-10, breaks=times, longest=0.25)
-
     def test_sweep(self, damping):
         law = "linear" if damping is None else "logarithmic"
         load = mp.SweepLoad("m1", 1.0, 0.1, 2.0, 20.0, law, tolerance=1e-9)
         self.check(damping, [load], lambda t: math.cos(load.course.phase(np.array([t]))[0]), 1e-9)
-
-    def test_smooth_function(self, damping):
-        load = mp.FunctionLoad("m1", lambda t: np.exp(-t) * np.sin(7 * t), tolerance=1e-9)
-        self.check(damping, [load], lambda t: math.exp(-t) * math.sin(7 * t), 1e-9, t_end=20.0)
 
 
 class TestContactsUnderLoads:

@@ -1,6 +1,5 @@
 """Whatever hands a state on hands all of it where friction holds places: pickles, joined structures, warnings."""
 
-import math
 import pickle
 import warnings
 
@@ -55,15 +54,3 @@ def test_two_bodies_that_rub_on_each_other_are_one_block_in_their_difference():
     assert_allclose(run.at("a.tip", t) - run.at("b.tip", t), block.at("tip", t), atol=1e-13)
     assert_allclose(run.at("a.tip", t) + run.at("b.tip", t), (0.33 + 0.2) * np.cos(2 * t), atol=1e-13)
     assert run.ledger.friction == pytest.approx(block.ledger.friction / 2, rel=1e-12)
-
-
-def test_a_stretched_spring_is_handed_to_a_steady_state():
-    given = model()
-    still = given.equilibrium({"m1": 0.7})
-    weak = mp.HarmonicLoad("m2", 1e-3, 0.31)
-    held = mp.steady_state(given, weak, other_loads=[mp.ConstantLoad("m1", 0.7)], start=still)
-    free = mp.steady_state(given, weak, other_loads=[mp.ConstantLoad("m1", 0.7)])
-    assert held.status == free.status == "periodic"
-    assert not held.trajectory.events
-    assert held.trajectory.friction_force("ring", 0.0) == pytest.approx(30.0 * still.stretches["ring"], abs=3e-3)
-    assert not math.isclose(held.displacement[1], free.displacement[1], rel_tol=1e-3)

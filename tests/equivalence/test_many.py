@@ -117,25 +117,6 @@ class TestSeveralRunsTogether:
         assert sum(calls) > 20
 
 
-class TestARunThatFails:
-    def test_is_a_status_of_its_row(self, monkeypatch):
-        """Refused, inside a rigid stop; not finite; and failed on the way, by chatter that is looked for too early."""
-        x = starts(5)
-        x[1, 5], x[3, 0] = -1.0, math.nan
-        found = mp.simulate_many(model("all"), END, x, points=["m5"], times=TIMES, threads=2)
-        assert found.status == ("ok", "failed", "ok", "failed", "ok")
-        assert "inside the rigid contact" in found.messages[1]
-        assert "NaN" in found.messages[3]
-        assert np.all(np.isnan(found.samples[[1, 3]]))
-        assert np.all(np.isfinite(found.samples[[0, 2, 4]]))
-        monkeypatch.setattr("multiphi_exudyn.time.motion.limits", lambda model: (2, 1e-3))
-        found = mp.simulate_many(model("all"), END, x[:1], points=["m5"], times=TIMES)
-        assert found.status == ("failed",)
-        assert "chatter" in found.messages[0]
-        assert 0 < found.ends[0] < END
-        assert_array_equal(np.isnan(found.samples[0, 0]), found.ends[0] < TIMES)
-
-
 @pytest.mark.parametrize(
     ("kind", "changes", "begins"),
     [

@@ -56,14 +56,3 @@ def test_pieces_that_end_with_an_event_or_close_to_it_neither_miss_nor_double_it
     instants = np.unique([e.time for e in expected.events])
     times = np.unique(np.concatenate([[0.0, 9.0], np.linspace(0.0, 9.0, 38), instants - apart, instants + apart]))
     assert_alike(run_of(ELEMENTS[elements], times[times >= 0.0]), expected, 1e-9)
-
-
-def test_pieces_around_a_signal_that_grazes_zero_agree_on_whether_it_touches():
-    """A gap a hair less than the first swing, and a hair more."""
-    free = run_of([])
-    times = np.linspace(0.0, END, 200001)
-    swing = -float(np.min(free.at("m2", times)))
-    for share, touches in ((1 - 1e-7, True), (1 + 1e-7, False)):
-        stop = [mp.UnilateralContact("below", "m2", swing * share, 50.0)]
-        for given in (None, np.linspace(0.0, 9.0, 1001)):
-            assert bool(run_of(stop, given).events) == touches

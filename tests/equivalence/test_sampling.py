@@ -1,10 +1,8 @@
 """States of many segments of a run at once: those that each segment has in closed form."""
 
-import pickle
-
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from small_structures import chain
 
 import multiphi_exudyn as mp
@@ -70,13 +68,6 @@ def test_the_sizes_of_a_motion_are_those_of_its_displacements_and_energies(loads
     assert found == pytest.approx(expected, rel=1e-12)
 
 
-def test_pieces_of_a_harmonic_so_short_that_it_is_a_polynomial_there():
-    """Its powers have shapes of their own."""
-    run = mp.simulate(model(mp.ModalDamping([0.02, 0.01, 0.03])), 0.5, loads=LOADS["harmonic"])
-    assert any(not each.basis.pure for each in run.segments)
-    assert_states_of_segments(run)
-
-
 GRIDS = {
     "even": np.linspace(0.0, 5.0, 1001),
     "even, coarse": np.linspace(0.2, 4.9, 23),
@@ -106,21 +97,3 @@ class TestPlacesGapsAndForces:
             assert_allclose(run.contact_force(name, times), forces, rtol=0, atol=50 * 1e-12)
         found = [vector @ s.level.configuration(s.modal(t))[:, 0] for s, t in expected]
         assert_allclose(run.at("m1", times), found, rtol=0, atol=1e-12)
-
-
-class TestWhateverHappensToTheRun:
-    @pytest.fixture(params=["constant", "harmonic", "samples"])
-    def loads(self, request):
-        return LOADS[request.param]
-
-    @staticmethod
-    def asked(run):
-        own = run.segments
-        times = np.linspace(0.0, run.t_end, 50)
-        places = own.owners(times)
-        return own.states(places, times - own.starts[places])
-
-    def test_a_pickled_run_has_the_same_states(self, loads):
-        run = mp.simulate(model(), 5.0, displacement=START, loads=loads)
-        again = pickle.loads(pickle.dumps(run))
-        assert_array_equal(self.asked(again), self.asked(run))

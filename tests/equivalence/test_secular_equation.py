@@ -59,20 +59,6 @@ def test_are_those_of_the_whole_matrix(k):
         assert_allclose(found[1] * signs, vectors, atol=1e-10)
 
 
-@given(st.integers(0, 2**31), st.sampled_from(STIFFNESSES), st.floats(0, 14), st.floats(0, 12))
-def test_clusters_and_components_of_any_size(seed, k, nearest, smallest):
-    """Neighbours down to round-off of each other, components over many orders."""
-    random = np.random.default_rng(seed)
-    d = 1 + np.cumsum(10.0 ** random.uniform(-nearest, 1, 30))
-    p = random.normal(size=30) * 10.0 ** random.uniform(-smallest, 0, 30)
-    found = rank_one_modes(d, p, k, 8)
-    assert found is not None
-    check(d, p, k, found)
-    index = np.arange(8)
-    assert np.all(found[0] >= d[index])
-    assert np.all(found[0] <= d[index + 1])
-
-
 def test_soft_modes_keep_their_digits_beside_stiff_ones():
     """omega^2 over sixteen orders: those of the whole matrix would have none left."""
     d = 10.0 ** np.arange(-8, 9)

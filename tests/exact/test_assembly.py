@@ -69,14 +69,6 @@ class TestMatrices:
         level, united = (MultiPhiModel(s, (), modes="all").level(()) for s in (whole, beam_of_halves()))
         assert_allclose(united.frequencies, level.frequencies, rtol=SAME_FREQUENCIES)
 
-    def test_masses_tied_are_the_matrices_of_their_chain(self):
-        united = assemble(masses(), [{"a.m2": 1.0, "b.m0": -1.0}])
-        mass = np.diag([1.0, 1.0, 3.0, 2.0])
-        stiffness = np.array([[2.0, -1, 0, 0], [-1, 2, -1, 0], [0, -1, 6, -5], [0, 0, -5, 5]])
-        order = [np.argmax(united.row(p)) for p in ("a.m0", "a.m1", "a.m2", "b.m1")]
-        assert_allclose(united.mass[np.ix_(order, order)], mass, rtol=0, atol=1e-15)
-        assert_allclose(united.stiffness[np.ix_(order, order)], stiffness, rtol=0, atol=1e-14)
-
     def test_the_order_of_ties_and_of_parts_changes_nothing(self):
         reference = frequencies(beam_of_halves())
         ties = [{name: -3.0 * c for name, c in tie.items()} for tie in TIED]

@@ -122,23 +122,6 @@ class TestTwoBodies:
         assert_balanced(run)
 
 
-class TestMany:
-    def test_blocks_without_springs_on_a_chain_are_the_limit_of_stiff_ones(self):
-        limits = (0.2, 0.1, 0.3)
-        runs = []
-        for stiffness in (math.inf, 1e6, 1e8):
-            elements = [mp.Friction(f"f{i}", f"m{2 * i}", limit, stiffness=stiffness) for i, limit in enumerate(limits)]
-            model = mp.MultiPhiModel(chain(6, stiffness=20.0), elements, modes="all")
-            runs.append(mp.simulate(model, 4.0, loads=[mp.HarmonicLoad("m5", 1.3, 0.6)]))
-        t = np.linspace(0, 4, 101)
-        x = [run.displacement(t) for run in runs]
-        errors = [np.max(np.abs(given - x[0])) / np.max(np.abs(x[0])) for given in x[1:]]
-        assert len(runs[0].events) > 10
-        assert errors[0] < 1e-2
-        assert errors[1] < 0.2 * errors[0]
-        assert_balanced(runs[0], 1e-11)
-
-
 @pytest.mark.parametrize("damping", [1e-2, 1e-4, 1e-6])
 @pytest.mark.parametrize("load", [0.0, 3.0])
 def test_a_block_that_hardly_any_dashpot_holds_keeps_its_digits(damping, load):

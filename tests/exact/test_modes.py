@@ -145,16 +145,6 @@ class TestLowestModes:
             expected, flexibility = (at @ (m.shapes / m.omega**2) @ m.shapes.T @ at.T for m in (exact, found))
             assert_allclose(flexibility, expected, rtol=0, atol=1e-8 * np.max(np.abs(expected), initial=0))
 
-    @pytest.mark.parametrize("copies", [2, 3, 4, 5, 7, 10, 13, 20])
-    def test_no_copy_of_a_mode_is_missed(self, copies):
-        """Equal chains side by side, looked for in numbers below and above that of the copies."""
-        for n, count in ((30, 3), (47, 10)) if copies % 2 else ((30, 10), (47, 3)):
-            mass, stiffness = (scipy.sparse.block_diag([m] * copies, format="csr") for m in chain(n, ends=2))
-            found = lowest_modes(mass, stiffness, count, np.zeros((0, n * copies)))
-            assert found.exact % copies == 0
-            expected = np.repeat(chain_frequencies(n, ends=2), copies)[: found.exact]
-            assert_allclose(found.modes.omega, expected, rtol=1e-9)
-
     @pytest.mark.parametrize("copies", [2, 7, 12])
     def test_all_are_found_where_an_iteration_sees_one_of_a_frequency_alone(self, monkeypatch, copies):
         """As without round-off: of modes of one frequency an iteration sees the part of its start among them."""

@@ -98,29 +98,6 @@ def against_the_law(model, t_end, x, v, t, loads=(), force=None, longest=0.02):
     return run
 
 
-class TestBelt:
-    """A block pressed onto a belt by a compliant contact, m 1, k 25, V .3, N 10, mu .2, mu_s .35."""
-
-    @pytest.mark.parametrize("turned", [1.0, -1.0])
-    def test_has_its_period(self, turned):
-        """The mass has no normal inertia of its own to swing with: N is what presses it, 10."""
-        structure = mp.LinearStructure(np.eye(2), np.diag([25.0, 1e-3]), points={"x": 0, "y": 1})
-        belt = mp.UnilateralContact(
-            "belt", "y", 0.0, 100.0, friction=0.2, static_friction=0.35, tangential={"x": turned},
-            tangential_velocity=0.3,
-        )  # fmt: skip
-        load = mp.ConstantLoad("y", -10.0 - 1e-4)  # what the contact and the small spring carry at a depth of .1
-        run = mp.simulate(
-            mp.MultiPhiModel(structure, [belt], modes="all"), 12.0, displacement=[0.0, -0.1],
-            velocity=[0.3 * turned, 0], loads=[load],
-        )  # fmt: skip
-        slips = [event.time for event in run.events if event.kind == "slip"]
-        assert len(slips) == 9
-        assert_allclose(np.diff(slips), 1.3424777960769378, rtol=1e-9)
-        assert_allclose(run.contact_force("belt", np.linspace(0, 12, 25)), 10.0, rtol=1e-9)
-        assert len(run.stick_intervals("belt")) >= 9
-
-
 class TestLiftOff:
     """A sliding block under an oscillating normal load, which lifts it off: event by event as an integrator says."""
 
@@ -274,24 +251,3 @@ def pads(rows, limits, static=1.0, element="block", normal=(100.0, 3.0)):
         given |= {"friction": mu, "static_friction": static * mu, "tangential": along}
         elements.append(mp.UnilateralContact(f"f{i}", across, -0.2, stiffness, **given))
     return structure, elements, start
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_contacts_of_constant_pressure_are_blocks(seed):
-    """Static limits that several reach at once, which of them slip and which turn: as blocks of the limits mu N."""
-    random = np.random.default_rng(seed)
-    rows, limits, static = random.normal(size=(3, 3)), random.uniform(0.2, 1.0, 3), 1.5
-    pulls, speed, t = 2 * random.normal(size=(2, 3)), random.normal(size=3), np.linspace(0, 6, 31)
-    runs = []
-    for element in ("block", "compliant", "viscous"):
-        structure, elements, pressed = pads(rows, limits, static, element)
-        loads = [
-            mp.ConstantLoad(np.r_[pulls[0], np.zeros(3)], 1.0),
-            mp.HarmonicLoad(np.r_[pulls[1], np.zeros(3)], 1.0, 0.4),
-        ]
-        model = mp.MultiPhiModel(structure, elements, modes="all")
-        runs.append(mp.simulate(model, 6.0, pressed, np.r_[speed, np.zeros(3)], loads))
-    assert [run.status for run in runs] == ["ok"] * 3
-    for run in runs[1:]:
-        assert_allclose(run.displacement(t)[:3], runs[0].displacement(t)[:3], atol=1e-9)
-        assert [e.kind for e in run.events] == [e.kind for e in runs[0].events]

@@ -7,7 +7,7 @@ import pytest
 import scipy.integrate
 from lawful import assert_lawful
 from numpy.testing import assert_allclose
-from small_structures import chain, random_structure
+from small_structures import random_structure
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.mechanics.time_functions import Harmonic
@@ -74,39 +74,6 @@ class TestBallsInARow:
         assert np.all(np.diff(after) >= -1e-12)
         assert float(after @ after) == pytest.approx(4 + 0.18 + 1, rel=1e-13)
         assert np.sum(after) == pytest.approx(1.6, rel=1e-13)
-
-    def test_of_several_restitutions_are_refused_by_name(self):
-        run = balls([0.0, 0.0], [0.5, 0.9], [1.0, 0.0, -1.0])
-        assert run.status == "failed"
-        assert "c0, c1: struck together, but their restitutions differ" in run.message
-
-
-class TestDrivenBack:
-    """At the start a mass that touches a wall and a second mass strikes the wall, and is thrown against the mass."""
-
-    @staticmethod
-    def thrown(masses, e_wall, e_mass, velocity, modes="all"):
-        structure = mp.LinearStructure(np.diag(masses), [[2.0, -2.0], [-2.0, 2.0]], points={"a": 0, "b": 1})
-        wall = mp.UnilateralContact("wall", {"a": -1.0}, 0.0, restitution=e_wall)
-        mass = mp.UnilateralContact("mass", {"a": 1.0, "b": -1.0}, 0.0, restitution=e_mass)
-        loads = [mp.ConstantLoad("a", 10.0)]
-        run = mp.simulate(mp.MultiPhiModel(structure, [wall, mass], modes=modes), 3.0, None, velocity, loads)
-        return run, loads, (np.zeros(2), np.array(velocity))
-
-    def test_all_impacts_at_the_start_are_those_of_all_modes(self):
-        """One mode of five coordinates: the impulses, and what they lose, are those of the whole structure."""
-        contacts = [mp.UnilateralContact(at, row, 0.0, restitution=0.8) for at, row in (("a", {"m0": -1.0}),)]
-        contacts.append(mp.UnilateralContact("b", {"m0": 1.0, "m1": -1.0}, 0.0, restitution=0.8))
-        runs = [
-            mp.simulate(mp.MultiPhiModel(chain(5), contacts, modes=modes), 1e-9, None, [2.0, -1.0, 0.5, 0.1, -0.3])
-            for modes in (1, "all")
-        ]
-        told = [[(e.contact, e.kind, e.impulse) for e in run.events if e.impulse] for run in runs]
-        assert [t[:2] for t in told[0]] == [t[:2] for t in told[1]]
-        assert len(told[0]) == 2
-        assert_allclose([t[2] for t in told[0]], [t[2] for t in told[1]], rtol=1e-13)
-        assert runs[0].ledger.impact == pytest.approx(runs[1].ledger.impact, rel=1e-12)
-        assert runs[0].ledger.residual == pytest.approx(0.0, abs=1e-12)
 
 
 class TestBetweenStops:

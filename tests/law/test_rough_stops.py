@@ -4,9 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from kernels import KERNELS, output_on
 from numpy.testing import assert_allclose
-from quadrature import works_by_quadrature
 from small_structures import chain
 
 import multiphi_exudyn as mp
@@ -53,13 +51,6 @@ class TestDroppedBlock:
         assert_allclose(run.stick_intervals("floor"), [[math.sqrt(2 / G), 3.0]], rtol=1e-12)
         assert run.at("x", 3.0) == pytest.approx(speed * math.sqrt(2 / G), rel=1e-12, abs=1e-15)
         assert run.ledger.impact == pytest.approx(G + speed**2 / 2, rel=1e-12)
-
-    def test_is_carried_along_by_a_belt(self):
-        run, falls = dropped(0.0, 0.1, tangential_velocity=2.0), math.sqrt(2 / G)
-        left = 2.0 - 0.1 * math.sqrt(2 * G)
-        assert run.events[1].time == pytest.approx(falls + left / (0.1 * G), rel=1e-12)
-        assert run.velocity(3.0)[0] == pytest.approx(2.0, rel=1e-12)
-        assert abs(run.ledger.residual) < 1e-12 * G
 
 
 class TestIncline:
@@ -188,35 +179,6 @@ class TestSeveral:
         assert run.ledger.friction > 0 < run.ledger.impact
         size = np.max(np.abs([event.loss.truncation_kinetic for event in run.events]))
         assert size < 1e-12 * run.ledger.work_of_loads
-
-    @pytest.mark.parametrize("kernel", KERNELS)
-    def test_have_the_same_events_on_every_processor(self, kernel):
-        code = (
-            "import multiphi_exudyn as mp\n"
-            "from test_rough_stops import TestSeveral, _rough, rubbing_chain\n"
-            "run = mp.simulate(rubbing_chain([_rough(2), _rough(5, -1.0)]), 4.0, loads=TestSeveral.LOADS)\n"
-            "print([(e.contact, e.kind, f'{e.time:.9g}') for e in run.events])\n"
-        )
-        run = mp.simulate(rubbing_chain([_rough(2), _rough(5, -1.0)]), 4.0, loads=self.LOADS)
-        expected = str([(e.contact, e.kind, f"{e.time:.9g}") for e in run.events])
-        assert output_on(kernel, code).strip().splitlines()[-1] == expected
-
-
-def test_a_belt_that_drives_what_sticks_works_against_what_slides_too():
-    """Mass couples two blocks on two belts: one is carried along, the other slides meanwhile."""
-    mass = [[1.0, 0.3, 0.0, 0.2], [0.3, 1.0, 0.1, 0.0], [0.0, 0.1, 1.0, 0.4], [0.2, 0.0, 0.4, 1.0]]
-    structure = mp.LinearStructure(mass, np.diag([5.0, 0.0, 3.0, 0.0]), points={"x": 0, "y": 1, "u": 2, "v": 3})
-    stops = [
-        mp.UnilateralContact(
-            "carried", "y", 0.0, friction=2.0, tangential={"x": 1.0, "u": 0.3}, tangential_velocity=0.1
-        ),
-        mp.UnilateralContact("sliding", "v", 0.0, friction=0.2, tangential="u", tangential_velocity=-1.0),
-    ]
-    weight = [mp.ConstantLoad("y", -10.0), mp.ConstantLoad("v", -10.0)]
-    run = mp.simulate(mp.MultiPhiModel(structure, stops, modes="all"), 0.5, velocity=[-0.2, 0, 1.0, 0], loads=weight)
-    assert any(segment.level.states == (1, 2) for segment in run.segments)
-    assert abs(run.ledger.residual) < 1e-13 * run.ledger.friction
-    assert_allclose(run.segments.works, works_by_quadrature(run), rtol=0, atol=1e-12)
 
 
 def feet(static):

@@ -171,24 +171,6 @@ def test_what_holds_once_a_stop_lets_go_does_not_fall_beside_it(force, beside, s
     assert run.ledger.residual == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize("levers", [(1.0, 1.0, 1.0), (1.0, -3.0, 0.5)])
-@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
-@pytest.mark.parametrize(("force", "speed"), [(1.6, 1.0), (2.45, 1.0), (2.45, 0.0), (2.55, 1.0)])
-def test_what_comes_to_rest_stays_while_static_limits_hold_it(force, speed, order, levers):
-    """Limits 0.2, 0.3 and 1 of one motion, the last one 2 at rest: at rest 2.5, whichever is named first."""
-    limits = [(0.2, 0.2), (0.3, 0.3), (1.0, 2.0)]
-    several = [
-        mp.Friction(f"f{k}", {"m": lever}, limit / abs(lever), static_limit=static / abs(lever))
-        for k, lever, (limit, static) in ((k, levers[k], limits[k]) for k in order)
-    ]
-    structure = mp.LinearStructure([[1.0]], [[0.0]], points={"m": 0})
-    model, load = mp.MultiPhiModel(structure, several, modes="all"), mp.ConstantLoad("m", -force)
-    run, stops = mp.simulate(model, 2.0, velocity=[speed], loads=[load]), speed / (force + 1.5)
-    later = max(2.0 - stops, 0.0) if force > 2.5 else 0.0
-    assert_allclose(run.velocity(2.0), [-(force - 1.5) * later], rtol=1e-13, atol=1e-15)
-    assert run.warnings == ()
-
-
 @pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
 @pytest.mark.parametrize(
     ("mass", "coupling", "limit", "scale"),

@@ -27,34 +27,6 @@ def test_with_all_modes_inside_the_frequencies_are_those_of_the_structure(beam):
     np.testing.assert_allclose(frequencies(component)[:10], exact[:10], rtol=1e-10)
 
 
-def test_the_interface_stiffness_is_the_condensed_one():
-    structure = chain(6, damping=ModalDamping([0.02]))
-    component = craig_bampton(structure, ("m1", "m4"), 2)
-    kept, inside = [1, 4], [0, 2, 3, 5]
-    k = structure.stiffness
-    condensed = k[np.ix_(kept, kept)] - k[np.ix_(kept, inside)] @ np.linalg.solve(
-        k[np.ix_(inside, inside)], k[np.ix_(inside, kept)]
-    )
-    np.testing.assert_allclose(component.stiffness[:2, :2], condensed, atol=1e-12)
-    projected = component.shapes.T @ k @ component.shapes
-    np.testing.assert_allclose(component.stiffness, projected, atol=1e-12)
-    np.testing.assert_allclose(component.shapes.T @ structure.mass @ component.shapes, component.mass, atol=1e-12)
-    np.testing.assert_allclose(component.shapes[kept], np.eye(2, 4), atol=1e-12)
-
-
-def test_a_start_loaded_at_the_interface_is_exact_and_one_loaded_inside_is_nearest_in_strain_energy(beam):
-    component = craig_bampton(beam, ("node2", "node3"), 3)
-    model = MultiPhiModel(beam, modes="all")
-    at_interface = model.static_equilibrium({"node3": 10.0})
-    np.testing.assert_allclose(component.shapes @ component.coordinates(at_interface), at_interface, atol=1e-12)
-    inside = model.static_equilibrium({"node1": 10.0})
-    left = inside - component.shapes @ component.coordinates(inside)
-    assert np.linalg.norm(left) > 1e-6 * np.linalg.norm(inside)
-    assert abs(beam.row("node2") @ left) < 1e-12
-    stiff = np.abs(component.shapes).T @ np.abs(beam.stiffness) @ np.abs(inside)
-    assert np.all(np.abs(component.shapes.T @ beam.stiffness @ left) < 1e-10 * stiff)
-
-
 def released(structure, contacts, force, modes, t_end, step, **settings):
     """Largest difference to the model without time steps, of all DoFs and recorded times, and the recorded run."""
     model = MultiPhiModel(structure, contacts, modes="all")

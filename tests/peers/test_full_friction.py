@@ -77,27 +77,3 @@ class TestOutputs:
         assert balance.friction > 0.3 * balance.work
         left = balance.initial + balance.work - balance.dissipated - balance.friction - balance.final
         assert abs(left) < 1e-3 * balance.work
-
-    def test_force_and_slip_are_those_of_the_bristle(self, both):
-        friction, run = both
-        force, slip = run.friction_force["ring"], run.slip["ring"]
-        assert np.max(np.abs(force)) == pytest.approx(friction.limit, rel=1e-6)
-        travel = run.points["middle"] - friction.velocity * run.time
-        np.testing.assert_allclose(force, friction.stiffness * (travel - slip), atol=1e-4 * friction.limit)
-
-
-@pytest.mark.parametrize(
-    ("frictions", "message"),
-    [
-        ([mp.Friction("ring", "tip", 1.0)], "friction 'ring' stiffness: got inf, need a finite one"),
-        ([dataclasses.replace(RING, direction="nose")], "friction 'ring' direction: got 'nose', need one of"),
-        ([RING, RING], "frictions: got the names .*, need each name once"),
-        (
-            [dataclasses.replace(RING, direction={"tip": 1.0, "middle": -1.0}, velocity=1.0)],
-            "friction 'ring' velocity: got 1.0 between two points",
-        ),
-    ],
-)
-def test_what_the_full_beam_cannot_have_is_refused(frictions, message):
-    with pytest.raises(mp.MultiPhiValueError, match=message):
-        FullBeam(BEAM, (), SETTINGS, frictions=frictions)

@@ -4,7 +4,7 @@ The linear equations M x'' + C x' + K x = f(t) + sum h lambda are integrated by 
 are so small that large displacements do not count. What the full beam adds is its step: errors fall with its square.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,22 +38,6 @@ STEPS = (4e-4, 2e-4)
 END = 0.12
 HIGHEST = 5e4  # rad/s: of the modes of the linear equations; those above move by less than 1e-6
 ANCF, EXACT = "ancf", "geometrically-exact"
-
-
-@dataclass(frozen=True)
-class Cubic:
-    """F = k1 q + k3 q^3."""
-
-    at: object = "inner"
-    name: str = "cubic"
-    k1: float = 300.0
-    k3: float = 0.0
-
-    def law(self, q):
-        return self.k1 * q + self.k3 * q**3
-
-    def force(self, q):
-        raise AssertionError("the full beam takes the law, not its segments")
 
 
 def damping_of(structure, ratio=0.05):
@@ -188,35 +172,6 @@ class TestStops:
         errors = errors_of(loads, force, contacts=[contact])
         assert errors[-1] < 3e-3
         assert order(errors) > 1.4  # events fall between steps
-
-    def test_a_viscous_contact_is_met_and_never_pulls(self):
-        contact = UnilateralContact("stop", "inner", 1e-4, 3e4, damping=40.0)
-        load = HarmonicLoad("tip", -5.0, 20.0, 0.5)
-
-        def force(full):
-            own, row = contact_force(full, contact, lambda t: (0.0, 0.0)), full.structure.row("tip")
-            return lambda t, x, v: own(t, x, v) - 100 * COURSES["harmonic"][1](t) * row
-
-        errors = errors_of([load], force, contacts=[contact])
-        assert errors[-1] < 3e-3
-        assert order(errors) > 0.8  # its force jumps where it closes
-        _, found = run([load], contacts=[contact])
-        assert np.min(found.contact_force["stop"]) == 0.0 < np.max(found.contact_force["stop"])
-        _, elastic = run([load], contacts=[replace(STOP, gap=1e-4)])
-        assert difference(found.points, elastic.points) > 1e-2
-
-
-class TestForceLaws:
-    def test_a_cubic_law_is_met_with_order_two(self):
-        law = Cubic({"inner": -2.0}, k3=2e11)
-
-        def force(full):
-            row, at = full.structure.row("tip"), -2 * full.structure.row("inner")
-            return lambda t, x, v: COURSES["harmonic"][1](t) * row - at * law.law(at @ x)
-
-        errors = errors_of([COURSES["harmonic"][0]], force, laws=[law])
-        assert errors[-1] < 2e-3
-        assert order(errors) > 1.8
 
 
 class TestArguments:

@@ -49,14 +49,3 @@ def test_under_a_constant_pressure_it_is_exudyns_friction_connector(share):
     for name in ("side.middle", "side.tip"):
         difference = np.linalg.norm(rubbed.points[name] - given.points[name])
         assert difference < (2e-3 if share == 1 else 2e-2) * np.linalg.norm(given.points[name])
-
-
-def test_force_is_within_the_cone_and_the_energy_balance_closes():
-    stop = mp.UnilateralContact("stop", "up.middle", gap=1e-6, stiffness=1e5)
-    run = full(1e-5, [stop], Tangent("side.middle", 1.0, friction=0.4, static_friction=0.4, stiffness=2e4))
-    assert len(run.contact_intervals["stop"]) > 4
-    pressure, balance = run.contact_force["stop"], run.balance
-    assert np.all(np.abs(run.friction_force["stop"]) <= 0.4 * pressure + 1e-2 * np.max(pressure))
-    assert balance.friction > 0
-    left = balance.initial + balance.work - balance.dissipated - balance.friction - balance.final
-    assert abs(left) < 1e-3 * balance.work

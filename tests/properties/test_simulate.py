@@ -114,12 +114,6 @@ class TestEquivalences:
         rest = self.run(2.0 - 0.77, half.displacement(0.77), half.velocity(0.77))
         assert rest.displacement(2.0 - 0.77) == pytest.approx(whole.displacement(2.0), abs=1e-10)
 
-    def test_time_reversal_of_an_undamped_compliant_run(self):
-        forth = self.run(1.0)
-        back = self.run(1.0, forth.displacement(1.0), -forth.velocity(1.0))
-        assert back.displacement(1.0) == pytest.approx(self.START, abs=1e-10)
-        assert back.velocity(1.0) == pytest.approx(np.zeros(4), abs=1e-8)
-
 
 class TestStarts:
     @pytest.mark.parametrize(("speed", "kinds"), [(-1.0, ["close", "open"]), (1.0, []), (0.0, [])])

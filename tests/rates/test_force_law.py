@@ -148,17 +148,6 @@ class TestModel:
         assert_allclose(found.contact_force("law", T), expected.contact_force("stop", T), rtol=0, atol=1e-11)
         assert_allclose(found.contact_intervals("law"), expected.contact_intervals("stop"), rtol=1e-13)
 
-    @pytest.mark.parametrize("slope", [-0.2, -0.5, -3.0, 0.7, 0.0])
-    def test_levels_of_signed_slopes_are_those_of_the_dense_matrix(self, slope):
-        structure = chain(5)
-        m = mp.MultiPhiModel(structure, [mp.ForceLaw("m4", ([-2, 0, 1, 2], [-4, 0, 2, 2 + slope]))], modes="all")
-        level = m.level({"law": "+1"} if slope != 2 else {})
-        dense = np.array(structure.stiffness)
-        dense[4, 4] += slope
-        assert_allclose(level.squares, np.linalg.eigvalsh(dense), rtol=1e-12, atol=1e-14)
-        assert_allclose(level.shapes.T @ dense @ level.shapes, np.diag(level.squares), atol=1e-13)
-        assert np.sum(level.frequencies < 0) == (slope < -0.2)
-
 
 class TestMotion:
     @pytest.mark.parametrize("name", UNLIKE)
@@ -175,33 +164,6 @@ class TestMotion:
             errors.append(relative(run.displacement(T), true))
         assert np.log2(errors[0] / errors[1]) / 2 > 1.8
         assert errors[1] < 1.2e-3
-
-    def test_several_laws_and_contacts_under_a_harmonic_load(self):
-        start = np.array([0.2, 0.6, 0.9, 1.4])
-        between = np.array([-1.0, 0.0, 1.0, 0.0])
-        buffer, harmonic = mp.UnilateralContact("buffer", "m1", 0.2, 30.0), mp.HarmonicLoad("m0", 0.3, 0.2)
-        times = np.linspace(0, 6, 121)
-
-        def force(t, x, v):
-            total = -between * magnet(between @ x)
-            total[3] -= two_wells(x[3])
-            total[1] += 30 * max(0.0, -x[1] - 0.2)
-            total[0] += 0.3 * np.cos(2 * np.pi * 0.2 * t)
-            return total
-
-        true = with_forces(chain(4), times, force, start, rtol=1e-10)
-        errors = []
-        for segments in (32, 128):
-            laws = [
-                law(two_wells, "m3", segments=segments, name="a"),
-                law(magnet, {"m2": 1.0, "m0": -1.0}, segments=segments, name="b"),
-            ]
-            run = mp.simulate(model(laws[0], buffer, laws[1], n=4), 6.0, displacement=start, loads=[harmonic])
-            assert run.status == "ok"
-            assert abs(run.ledger.residual) < 1e-9
-            errors.append(relative(run.displacement(times), true))
-        assert np.log2(errors[0] / errors[1]) / 2 > 1.8
-        assert errors[1] < 2e-3
 
     def test_a_step_across_many_segments_at_one_instant_is_found(self):
         """Two modes cannot hold the start, so that the law finds itself elsewhere."""

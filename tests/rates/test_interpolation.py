@@ -57,12 +57,6 @@ class TestJumps:
             sides = place * scale + 2e-15 * END * scale * np.array([-1, 1])
             assert_allclose(history.at(sides), [function(t) for t in sides.tolist()], rtol=0, atol=1e-8)
 
-    def test_all_jumps_of_a_square_wave_are_found(self):
-        history = Smooth(lambda t: np.sign(np.sin(2 * math.pi * 50.3 * t))).history(END)
-        assert_allclose(inner(history.jump_times()), np.arange(1, 202) / 100.6, rtol=1e-13)
-        t = places(2, 10_000)
-        assert_allclose(history.at(t), np.sign(np.sin(2 * math.pi * 50.3 * t)), rtol=0, atol=1e-13)
-
     def test_a_steep_smooth_function_is_not_taken_for_a_jump(self):
         history = Smooth(lambda t: np.tanh((t - 0.7) / 1e-6)).history(END)
         t = 0.7 + 1e-6 * np.linspace(-20, 20, 401)

@@ -7,10 +7,8 @@ import math
 import numpy as np
 import pytest
 from scipy.stats import spearmanr
-from small_structures import chain, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.time.truncation import defects
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 
 END = 0.3
@@ -47,15 +45,6 @@ def test_the_indicator_ranks_truncated_answers_and_is_near_their_error():
     assert np.all(indicated[true > 1e-5] < 6 * true[true > 1e-5])
 
 
-def test_the_first_defect_is_the_static_residual_of_the_start():
-    """One mode of two: the other one's amplitude is the defect."""
-    structure = mp.LinearStructure(np.diag([1.0, 4.0]), np.diag([1.0, 100.0]), points={"a": 0, "b": 1})
-    run = mp.simulate(mp.MultiPhiModel(structure, modes=1), 1.0, displacement=np.array([1.0, 0.25]))
-    (found,) = defects(run)
-    assert (found.time, found.closed) == (0.0, ())
-    assert found.size == pytest.approx(2 * 0.25)  # x sqrt(m)
-
-
 @pytest.mark.parametrize("tolerance", [0.3, 0.05, 0.02, 0.003, 1e-4])
 def test_a_tolerance_is_kept(tolerance):
     model, start, answer = rig(1e6)
@@ -73,28 +62,6 @@ def test_a_tolerance_out_of_reach_is_said_and_the_answer_has_all_modes_allowed()
     assert run.model.level(()).modes == 8
     (told,) = (sentence for sentence in run.warnings if sentence.startswith("truncation: the indicator is 0."))
     assert "with 8 modes, the tolerance 0.01" in told
-
-
-def test_modes_up_to_a_frequency():
-    contacts = [stop("m7", 0.05, 50.0), stop("m3", 0.5, name="other")]
-    model = mp.MultiPhiModel(chain(8), contacts, modes=mp.UpTo(0.15))
-    every = dataclasses.replace(model, modes="all")
-    for closed in ((), ("stop",), ("other",), ("stop", "other")):
-        kept, all_of_it = model.level(closed).frequencies, every.level(closed).frequencies
-        assert np.array_equal(kept, all_of_it[all_of_it <= 0.15])
-    run = mp.simulate(model, 30.0, displacement=np.linspace(0, 1, 8))
-    assert run.status == "ok"
-    assert abs(run.ledger.residual) < 1e-12
-
-
-def test_a_tolerance_keeps_the_rigid_body_modes():
-    free = mp.MultiPhiModel(chain(4, ends=0), [stop()], modes=mp.Tolerance(1.0, most=3))
-    run = mp.simulate(free, 2.0, displacement=np.ones(4), velocity=-np.ones(4))
-    assert run.status == "ok"
-    assert run.model.level(()).modes >= 2
-    single = mp.LinearStructure([[1.0]], [[0.0]], points={"m0": 0})
-    falling = mp.simulate(mp.MultiPhiModel(single, modes=mp.Tolerance(0.1)), 1.0, velocity=np.array([1.0]))
-    assert falling.at("m0", 1.0) == pytest.approx(1.0)
 
 
 class TestToleranceIsKept:
