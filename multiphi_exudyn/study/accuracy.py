@@ -49,7 +49,6 @@ from multiphi_exudyn.study.runs import (
     environment,
     from_arrays,
     in_turns,
-    load_average,
     modes_text,
     to_arrays,
     undisturbed,
@@ -508,7 +507,7 @@ class TimedRun:
     study: Study
 
     def __call__(self, parameters: Mapping[str, Any]) -> Outcome:
-        """Times [s], and the machine's load average of the last minute when they were taken."""
+        """Times [s]."""
         setup = _bench(self.study, parameters)
         run = run_model(setup, self.study.model_name(parameters), progress=False)
         values = {
@@ -517,7 +516,6 @@ class TimedRun:
             "online_s": run.online_s,
             "offline_s": run.offline_s,
             "sampling_s": run.sampling_s,
-            "load_average": load_average(),
         }
         return Outcome(values, {}, run.status, run.message)
 

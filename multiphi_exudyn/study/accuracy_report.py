@@ -6,7 +6,6 @@ import itertools
 import math
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
-from datetime import datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -76,10 +75,6 @@ __all__ = [
 
 
 MOST_POINTS = 6  # of the scene's axes shown in pictures and tables
-BUSY = 1.5  # load average above which other programs were running: the run itself causes 1
-LOAD_MEMORY = timedelta(minutes=4)  # after which a load average of one minute no longer contains an earlier load
-TICK = 1e-9  # s, resolution of the clock
-UNSTEADY = 2.0  # longest over shortest repeat above which the report mentions it
 
 
 def findings(result: StudyResult) -> dict[str, tuple[str, ...]]:
@@ -197,32 +192,12 @@ def _failures(result: StudyResult) -> dict[str, Any]:
 
 def _times(result: StudyResult) -> dict[str, Any]:
     timed = settings(result).dropna(subset="repeats_s")
-    timed = timed[timed.repeats_s.map(len) > 0]
-    repeated = timed[~timed.in_turns]  # the others' quartiles do not depend on their longest times
-    spread = repeated.repeats_s.map(lambda repeats: max(repeats) / max(min(repeats), TICK)).astype(float)
-    widest = repeated.loc[[spread.idxmax()]].iloc[0] if len(repeated) else None
     return {
-        "spread": None if widest is None else float(spread.max()),
-        "widest": None if widest is None else named(widest.method, widest.setting),
-        "unsteady": UNSTEADY,
-        "loads": _loads(result),
-        "busy": BUSY,
         "hosts": len({row.environment.get("host") for row in (*result.timings, *result.turns)}),
         "rounds": timed.repeats_s[timed.in_turns].map(len).tolist(),
         "near": NEAR,
         "counts": [len(row.values["repeats_s"]) for row in result.timings if row.status == "ok"],
     }
-
-
-def _loads(result: StudyResult) -> list[float]:
-    """Load averages of the machine during the timing pass, if the system has them.
-
-    Those of the first minutes are left out, since they contain the load before.
-    """
-    ended = [datetime.fromisoformat(row.finished.replace("Z", "+00:00")) for row in result.timings]
-    late = [row for row, at in zip(result.timings, ended, strict=True) if at - min(ended) > LOAD_MEMORY]
-    given = [row.values["load_average"] for row in late if row.status == "ok"]
-    return [load for load in given if load is not None]
 
 
 MARKERS = ("o", "D", "^", "v", "<", ">", "p", "h", "*")  # one more than colours: no two methods look alike
@@ -479,16 +454,12 @@ def _point(result: StudyResult, at: Mapping[str, Any]) -> dict[str, Any]:
     """What is shown for one point of the scene's axes."""
     drawn = settings_at(result, at)
     known = drawn.dropna(subset=["online_s", "error"])
-    axes, methods = numeric_axes(drawn, "setting"), drawn.method.unique()
-    touched = pd.concat([references_at(result, at), most_accurate(result, at)])
     return {
         "at": at,
         "uncertainty": uncertainty(result, at),
         "pareto": Picture.of(pareto_figure(result, at), PARETO) if len(known) else None,
         "convergence": _drawn(convergence_figure(result, at), CONVERGENCE),
-        "lines": [line for axis in axes for name in methods if (line := series(drawn, name, axis))],
         "stiff": records(stiff_errors(result, at)),
-        "contact": [each for each in records(touched) if each["measures"].get("first_contact")],
     }
 
 

@@ -18,10 +18,8 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.animation import PillowWriter
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from PIL import Image
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import one_of
@@ -40,7 +38,6 @@ PERIOD_SHOWN = 10.0  # s of animation for the longest period of the open structu
 LONGEST = 40.0  # s, of an animation with the default slow motion
 MOST_FRAMES = 3000  # two minutes: more is probably a typing error
 RESOLUTION = 76  # dots per inch: 700 pixels wide
-COLOUR_COUNT = 48
 MARGIN = 0.12  # of the range of the heights, above and below
 CLOSED, OPEN = "#D55E00", "#BBBBBB"
 WIDTHS = (2.0, 4.5)  # points, of the reduced model and of the reference below it
@@ -111,7 +108,7 @@ def _changed(scene: Scene, **fields: Any) -> Scene:
 def gif(animated: AnimatedScene, runs: Mapping[str, ModelRun], drawn: Callable[[], object] = lambda: None) -> bytes:
     """Return the animation of two finished runs as an endless GIF; drawn: called after every frame."""
     figure, move = moving_figure(animated, runs)
-    writer = _FewColours(fps=int(FRAME_RATE))
+    writer = PillowWriter(fps=int(FRAME_RATE))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "animation.gif"
         with writer.saving(figure, path, RESOLUTION):
@@ -122,59 +119,61 @@ def gif(animated: AnimatedScene, runs: Mapping[str, ModelRun], drawn: Callable[[
         return path.read_bytes()
 
 
-class _FewColours(PillowWriter):
-    """Writer with one palette of few colours for all frames: a quarter of the file size."""
-
-    _frames: list[Image.Image]
-
-    def finish(self) -> None:
-        """Write all frames."""
-        sample = self._frames[0].convert("RGB")
-        sample.paste(CLOSED, (0, 0, 60, 60))  # the first frame may lack this colour
-        palette = sample.quantize(COLOUR_COUNT, dither=Image.Dither.NONE)
-        frames = [frame.convert("RGB") for frame in self._frames]
-        self._frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-        super().finish()
-
-
 @rc_context(STYLE | {"axes.grid": False, "legend.fontsize": 9})
 def moving_figure(animated: AnimatedScene, runs: Mapping[str, ModelRun]) -> tuple[Figure, Move]:
-    """Figure of both runs, and the function that updates it to a frame."""
+    """Figure of both runs, and the function that updates it to a frame.
+
+    A panel for each beam, with a mark for each stop, which is coloured while its contact is closed; a history below.
+    """
     reduced, reference = (runs[name] for name in animated.models)
     figure, axes = panels([*[2.6] * len(animated.beams), 2.3])
-    moves: list[Move] = []
+    time, history = animated.time, axes[-1]
+    shapes: list[tuple[Line2D, np.ndarray]] = []
+    stops: list[tuple[Line2D, np.ndarray, np.ndarray]] = []
+    tails: list[tuple[Line2D, np.ndarray]] = []
     for run, colour, width in ((reference, REFERENCE, WIDTHS[1]), (reduced, COLOURS[0], WIDTHS[0])):
         for (beam, (x, nodes)), panel in zip(animated.beams.items(), axes, strict=False):
             (line,) = panel.plot(x, x, color=colour, lw=width, label=run.name)
-            moves += [_shape(line, np.array([animated.at(run, node) for node in nodes]))]
-            moves += _stops(animated, run, beam, panel, 2 * width)
+            shapes.append((line, np.array([animated.at(run, node) for node in nodes])))
+            for along, up, z, closed in _stops(animated, run, beam):
+                (mark,) = panel.plot([along], [0], marker="^" if up else "v", ms=2 * width, ls="none", zorder=3)
+                stops.append((mark, z, closed))
         values = animated.at(run, _most_mobile_point(animated, run))
-        axes[-1].plot(animated.time, values, color=OPEN, lw=width / 2, zorder=0)
-        (line,) = axes[-1].plot([], [], color=colour, lw=width / 2, marker="o", ms=width, markevery=[-1])
-        moves.append(_history(line, animated.time, values))
-    _frame(animated, runs, figure, axes)
-    clock = axes[-1].set_title("", fontsize=10, loc="right")
+        history.plot(time, values, color=OPEN, lw=width / 2, zorder=0)
+        (line,) = history.plot([], [], color=colour, lw=width / 2, marker="o", ms=width, markevery=[-1])
+        tails.append((line, values))
+    for (beam, (_, nodes)), panel in zip(animated.beams.items(), axes, strict=False):
+        z = np.array([animated.at(run, node) for run in runs.values() for node in nodes])
+        room = MARGIN * np.ptp(z) or 1.0
+        panel.set(ylim=(np.min(z) - room, np.max(z) + room), ylabel=f"{beam} w [mm]".strip())
+    axes[-2].set_xlabel("x [m]")
+    axes[0].legend(loc="upper left")
+    spans, meaning = grey_spans(reference)
+    for start, end in spans:
+        history.axvspan(start, end, color=BAND, lw=0, zorder=-1)
+    history.set(xlabel="time [s]", ylabel=f"{_most_mobile_point(animated, reference)} [mm]", xlim=(0.0, time[-1]))
+    history.set_title(meaning and f"grey: {meaning}", fontsize=9)
+    run_times = "; ".join(f"{run.label}: {seconds(run.online_s)}" for run in (reduced, reference))
+    title = f"{animated.setup.scene.file.title}, {animated.slow:g} times slower than in reality"
+    figure.suptitle(f"{title}\ncomputed in: {run_times}", fontsize=9)
+    clock = history.set_title("", fontsize=10, loc="right")
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # computed once, not in every frame
 
     def move(frame: int) -> None:
-        for each in moves:
-            each(frame)
-        clock.set_text(f"t = {animated.time[frame]:.3f} s")
+        for line, deflection in shapes:
+            line.set_ydata(deflection[:, frame])
+        for mark, z, closed in stops:
+            mark.set(ydata=z[frame : frame + 1], color=CLOSED if closed[frame] else OPEN)
+        for line, values in tails:
+            line.set_data(time[: frame + 1], values[: frame + 1])
+        clock.set_text(f"t = {time[frame]:.3f} s")
 
     return figure, move
 
 
-def _shape(line: Line2D, deflection: np.ndarray) -> Move:
-    return lambda frame: line.set_ydata(deflection[:, frame])
-
-
-def _history(line: Line2D, time: np.ndarray, values: np.ndarray) -> Move:
-    return lambda frame: line.set_data(time[: frame + 1], values[: frame + 1])
-
-
-def _stops(animated: AnimatedScene, run: ModelRun, beam: str, axes: Axes, size: float) -> Iterator[Move]:
-    """Draw the stop of each contact of a beam as a mark, which changes its colour while the contact is closed."""
+def _stops(animated: AnimatedScene, run: ModelRun, beam: str) -> Iterator[tuple[float, bool, np.ndarray, np.ndarray]]:
+    """Of each stop of a beam: its x [m], whether it is below, and in every frame its z [mm] and whether it is met."""
     beams = animated.setup.mechanics.beams
     assert beams is not None, "checked in prepare_animation"
     for contact in animated.setup.mechanics.contacts:
@@ -183,36 +182,7 @@ def _stops(animated: AnimatedScene, run: ModelRun, beam: str, axes: Axes, size: 
         for point, c in coefficients(contact).items():
             name, along = beams.points[point]
             if name == beam:
-                (mark,) = axes.plot([along], [0], marker="^" if c > 0 else "v", ms=size, ls="none", zorder=3)
-                yield _stop(mark, animated.at(run, point) - gap / c, closed)
-
-
-def _stop(mark: Line2D, z: np.ndarray, closed: np.ndarray) -> Move:
-    def move(frame: int) -> None:
-        mark.set(ydata=z[frame : frame + 1], color=CLOSED if closed[frame] else OPEN)
-
-    return move
-
-
-def _frame(animated: AnimatedScene, runs: Mapping[str, ModelRun], figure: Figure, axes: list[Axes]) -> None:
-    """Set limits, labels and titles, and shade the times at which the reference is in contact."""
-    reduced, reference = (runs[name] for name in animated.models)
-    for (beam, (_, nodes)), panel in zip(animated.beams.items(), axes, strict=False):
-        z = np.array([animated.at(run, node) for run in runs.values() for node in nodes])
-        room = MARGIN * np.ptp(z) or 1.0
-        panel.set(ylim=(np.min(z) - room, np.max(z) + room), ylabel=f"{beam} w [mm]".strip())
-    axes[-2].set_xlabel("x [m]")
-    spans, meaning = grey_spans(reference)
-    for start, end in spans:
-        axes[-1].axvspan(start, end, color=BAND, lw=0, zorder=-1)
-    axes[-1].set(
-        xlabel="time [s]", ylabel=f"{_most_mobile_point(animated, reference)} [mm]", xlim=(0.0, animated.time[-1])
-    )
-    axes[-1].set_title(meaning and f"grey: {meaning}", fontsize=9)
-    axes[0].legend(loc="upper left")
-    title = f"{animated.setup.scene.file.title}, {animated.slow:g} times slower than in reality"
-    run_times = "; ".join(f"{run.label}: {seconds(run.online_s)}" for run in (reduced, reference))
-    figure.suptitle(f"{title}\ncomputed in: {run_times}", fontsize=9)
+                yield along, c > 0, animated.at(run, point) - gap / c, closed
 
 
 def _most_mobile_point(animated: AnimatedScene, run: ModelRun) -> str:

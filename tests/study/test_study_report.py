@@ -98,20 +98,6 @@ def test_the_short_form_and_an_unknown_uncertainty_are_told():
     assert "A reference failed" in " ".join(findings(result_of([row("reference", status="failed")]))["distrust"])
 
 
-def test_a_busy_machine_and_unsteady_repeats_are_told():
-    calm = timing("a", 1.0)
-    busy = replace(calm, values=calm.values | {"load_average": 3.25, "repeats_s": [1.0, 1.0, 4.0]})
-    first = replace(timing("a", 1.0, setting=STEP), values=calm.values | {"load_average": 9.0})  # of what ran before
-    late = [replace(each, finished="2026-01-02T04:10:00Z") for each in (calm, busy)]
-    results = [result_of([row("a", 0.1)], [first, each]) for each in late]
-    doubts = [" ".join(findings(each)["distrust"]) for each in results]
-    assert findings(results[1])["timing"][-1].endswith("Load average of the machine meanwhile: 3.2 to 3.2.")
-    assert "Other programs" not in doubts[0]
-    assert "differ most" not in doubts[0]
-    assert "Other programs ran during the timing pass: the load average rose to 3.2" in doubts[1]
-    assert "The repeats of a differ most: 4 to 1." in doubts[1]
-
-
 def test_what_was_timed_in_turns_is_told():
     rows, timings = [row("a", 0.1), row("b", 0.1)], [timing("a", 1.0), timing("b", 1.1)]
     turns = (in_turns([("a", {}, [1.0] * 9), ("b", {}, [1.1] * 8 + [9.9])]),)
@@ -163,7 +149,6 @@ def test_every_section_with_data_appears_in_its_place(page):
         "The cheapest model for a tolerance",
         "Convergence",
         "Time-frequency maps",
-        "Contact, every method at its most accurate setting",
         "Failed runs",
         "How errors and times were computed",
         "Assumptions",
