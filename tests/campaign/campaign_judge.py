@@ -12,10 +12,10 @@ import campaign_bodies
 import numpy as np
 from campaign_scenes import later, scaled
 from campaign_scenes.parts import NEAR
+from lawful import complaints
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.study.stability.law_check import broken_laws
-from multiphi_exudyn.study.stability.run_laws import complaints
+from multiphi_exudyn.study.law_check import broken_laws
 from reference_models.body_alone import solve_body_alone
 
 NO_MOTION = 1e-6  # of a scene's length and speed
@@ -165,7 +165,7 @@ def _verdicts(scene, motion):
     found = [
         (verdict.format(text.split(":")[0]), text)
         for run, given in zip(motion.runs, motion.given, strict=True)
-        for text in laws_of(scene, run, *given)
+        for text in laws_of(run, *given)
     ]
     for kind, text in compared:
         excused = kind == "failure: wrong" and told(motion)
@@ -186,16 +186,9 @@ def told(motion, kinds=NOT_UNIQUE):
     return any(text.startswith(kinds) for run in motion.runs for text in run.warnings)
 
 
-def laws_of(scene, run, loads, x, v):
-    """What must hold of every run (study/stability, run_laws.py and law_check.py)."""
-    time, length, mass = (2.0**power for power in scene.units)
-    found = complaints(run, joule=mass * (length / time) ** 2, metre=length, varying=not _constant(scene))
-    return [*found, *broken_laws(run, loads, (x, v))]
-
-
-def _constant(scene):
-    """Whether no load and no stop varies in time."""
-    return all(isinstance(load, (mp.ConstantLoad, mp.Gravity)) for load in scene.loads)
+def laws_of(run, loads, x, v):
+    """What must hold of every run (study/law_check.py)."""
+    return complaints(run, loads, (x, v))
 
 
 def _compared(scene, motion):

@@ -3,7 +3,7 @@
     python tests/campaign/random_campaign.py --kinds all --count 20000 --processes 2
 
 Case by case, each from its kind and number alone: no exception but a named one, and what must hold of every run
-(study/stability, run_laws.py and law_check.py). All kinds (campaign_scenes) but "plain" (strategies.py) and "lattice"
+(study/law_check.py). All kinds (campaign_scenes) but "plain" (strategies.py) and "lattice"
 are judged by brute force (campaign_judge.py). With ``--kernels Prescott,Haswell`` the same cases run under each of
 these kernels of the linear algebra library, each in its own process, and their statuses, numbers of events and answers
 are compared.
@@ -14,7 +14,7 @@ their limits, in other units, and contacts that rub in proportion to their force
 friction takes is compared too.
 
 "lattice": small integers and zeros, equal places, coinciding events, all elements together, judged by the law check
-alone (study/stability/law_check.py): ``--kinds lattice --count 20000``.
+alone (study/law_check.py): ``--kinds lattice --count 20000``.
 
 Finished chunks stand in a file, so that a campaign that was stopped goes on where it was; the summary names every
 failing case with its cause. A case alone: ``--kinds viscous --first 17 --count 1``.
@@ -33,16 +33,16 @@ from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # a plain checkout
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "helpers"))
 
 import campaign_judge
 import numpy as np
 import threadpoolctl
 from campaign_scenes import KINDS, numbers, scene_of
+from lawful import complaints
 from strategies import built, recipe_of
 
 from multiphi_exudyn import MultiPhiError, MultiPhiWarning, simulate
-from multiphi_exudyn.study.stability.law_check import broken_laws
-from multiphi_exudyn.study.stability.run_laws import complaints
 from multiphi_exudyn.study.sweep import TimeLimitExceeded, call_within
 from reference_models.exudyn_quiet import quiet
 
@@ -95,7 +95,7 @@ def _verdicts(number):
     run = _run(case)
     if run.message and "chatter" in run.message:  # a named failure of a run that need not have failed
         return [("chatter", run.message)]
-    told = [*complaints(run), *broken_laws(run, case.loads, (case.displacement, case.velocity))]
+    told = complaints(run, case.loads, (case.displacement, case.velocity))
     found = [(f"failure: {text.split(':')[0]}", text) for text in told]
     return found or [("ok" if run.status == "ok" else "named failure", run.message)]
 

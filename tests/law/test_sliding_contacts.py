@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.study.stability.law_check import broken_laws
+from multiphi_exudyn.study.law_check import broken_laws
 
 
 @pytest.mark.parametrize("speed", [2.0, -2.0, 0.3])

@@ -8,7 +8,7 @@ from small_structures import chain
 from true_law import against_viscous
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.study.stability.law_check import broken_laws
+from multiphi_exudyn.study.law_check import broken_laws
 
 T = np.linspace(0, 12, 121)
 

@@ -25,6 +25,7 @@ import numpy as np
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.friction import Friction
+from multiphi_exudyn.study.law_check import broken_laws
 from multiphi_exudyn.study.stability import run_laws
 from multiphi_exudyn.study.stability.brute_force import (
     ContactSamples,
@@ -36,7 +37,6 @@ from multiphi_exudyn.study.stability.brute_force import (
     truncated,
 )
 from multiphi_exudyn.study.stability.case import Problem
-from multiphi_exudyn.study.stability.law_check import broken_laws
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["BEYOND", "Judgement", "judge"]

@@ -1,4 +1,4 @@
-"""Law check: the laws of mechanics and of contact at random instants of a trajectory, without any reference.
+"""The judge of a run: the laws of mechanics and of contact along a trajectory, without any reference.
 
     broken = broken_laws(trajectory, loads, start=(x0, v0))   # [] where every law holds, else one sentence for each
 
@@ -11,13 +11,16 @@ What is checked, at a few instants of the segments and at a few events, always t
     force law   N = -F(q)
     instants    x never jumps;   M (x'+ - x'-) = sum h p - sum h_t q,   p >= 0, |q| <= mu p, q of rigid contacts alone
                 g'+ >= 0, for a contact struck once without friction g'+ = -e g'-;   without impulse x' does not jump
-    energy      the ledger is closed, its rows impact, damping and friction are not negative, and its first and last
-                energies are those of x and x'
+    switching   all over the run, refined at the lowest places: an open contact is not inside its stop, a closed one
+                presses, what sticks stays within its limit; whatever changes its state has an event
+    energy      the ledger is closed, its rows impact, damping and friction are not negative, its losses are those of
+                the events, its first and last energies those of x and x'; energy less the work of constant loads never
+                rises, but by what a damped stop gives back that closes again inside (``lawful_rise``)
 
 Of a truncated model: the equation of motion projected onto the modes of the level, N >= 0 of rigid and viscous
-contacts, |T| <= mu_s N, a closed ledger with these rows. The check shares with the loop what the trajectory tells
-through ``displacement``, ``velocity``, ``acceleration``, ``gap``, ``contact_force``, ``friction_force``, ``events`` and
-``ledger``, and nothing else: matrices, contacts and loads are those that the model was given.
+contacts, |T| <= mu_s N, no open contact deeper inside its stop than the trajectory reports, a closed ledger with these
+rows, no rise of energy but at events. The check shares with the loop what the public methods of the trajectory tell,
+and nothing else: matrices, contacts and loads are those that the model was given.
 
 Every bound is relative to the absolute values of the terms that are summed.
 """
@@ -26,14 +29,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 import scipy.sparse
 from scipy.optimize import lsq_linear
 
-from multiphi_exudyn.events.transitions.state import event_table
+from multiphi_exudyn.events.transitions.state import event_table, total_loss
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping
 from multiphi_exudyn.mechanics.element import Element
@@ -42,10 +45,10 @@ from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
 from multiphi_exudyn.mechanics.structure import damping_matrix
 from multiphi_exudyn.mechanics.time_functions import Harmonic
-from multiphi_exudyn.study.stability.given_motions import approximated, forces_at, stop_motion
+from multiphi_exudyn.study.given_motions import approximated, forces_at, stop_motion
 from multiphi_exudyn.time.trajectory import Trajectory
 
-__all__ = ["broken_laws"]
+__all__ = ["broken_laws", "energy_rise", "lawful_rise"]
 
 INTERVALS = 20  # short intervals within segments, on each of which the laws are checked at NODES instants
 NODES = 6  # of Gauss quadrature, which integrates over an interval of at most one radian exactly
@@ -63,6 +66,13 @@ TOUCHES = 1e-13  # of a gap's terms: less is none
 BRIEF = 1e-11  # of the run: the same of a shorter bounce
 BOUNCE = 1e-11  # of the largest displacement: a lower bounce may be no more resolved
 SHORTEST = 1e-10  # of the run: a shorter segment is not looked into
+SAMPLES = 20_000  # instants of the grid all over the run
+SEGMENTS = 60  # segments that it covers: the first and the last ones
+PER_PERIOD = 24  # of its instants in the shortest period, if there are as many
+NEAR_END = 1e-9  # of a segment: how near to its ends the grid comes
+LOWEST = 8  # places at which a lowest value is looked for between the instants
+POLISH, ROUNDS = 41, 3  # instants around such a place, so many times over
+REPORTED = 0.5  # of a depth that is found: less must not be reported; both are sampled
 
 
 def broken_laws(
@@ -72,6 +82,7 @@ def broken_laws(
     intervals: int = INTERVALS,
     seed: int = 0,
     exact: float = EXACT,
+    samples: int = SAMPLES,
 ) -> list[str]:
     """The laws that a run breaks, one sentence each with an instant and by how much; empty if it obeys all.
 
@@ -89,6 +100,8 @@ def broken_laws(
         Of the random instants.
     exact : float
         Share of the terms of a force or a velocity above which a deviation is no round-off.
+    samples : int
+        How many instants all over the run are looked at for what switches without an event.
 
     Returns
     -------
@@ -103,7 +116,29 @@ def broken_laws(
     if inside is not None:
         for check in (_motion, _derivatives, _contacts, _impulses_of_forces, _frictions, _laws):
             found += check(run, inside)
+        found += _switching(run, inside, run.grid(samples))
     return [*found, *_instants(run), *_energies(run, inside)]
+
+
+def energy_rise(trajectory: Trajectory, loads: Sequence[Load] = ()) -> float | None:
+    """By how much [J] energy less the work of the loads rises; None where loads or counter-surfaces do other work.
+
+    In a truncated model within segments alone: at an event the next level's modes may store energy.
+    """
+    return _rise(_Run(trajectory, tuple(loads), None, EXACT)) if trajectory.segments else 0.0
+
+
+def lawful_rise(trajectory: Trajectory) -> str:
+    """Why energy may rise in this run without a law being broken, as a sentence; empty where it may not."""
+    returned = -sum(min(0.0, event.loss.damping) for event in trajectory.events)
+    given = -sum(min(0.0, event.loss.truncation_strain) for event in trajectory.events)
+    belts = [getattr(e, "velocity", 0.0) or getattr(e, "tangential_velocity", 0.0) for e in trajectory.model.contacts]
+    causes = {
+        f"a damped stop that closes again inside gives back {returned:.3g} J that its spring had stored": returned > 0,
+        f"transitions between truncated levels store {given:.3g} J": given > 0,
+        "the counter-surfaces do work": any(belts),
+    }
+    return "; ".join(cause for cause, holds in causes.items() if holds)
 
 
 @dataclass(frozen=True)
@@ -155,6 +190,7 @@ class _Run:
         self.mass, self.stiffness = self.structure.mass, self.structure.stiffness
         self._kept: dict[tuple[int, ...], np.ndarray] = {}
         self.root = np.sqrt(np.asarray(self.mass.diagonal(), float))[:, None]
+        self.asked = exact
         self.exact = max(exact, INTERPOLATED) if approximated(loads) else exact
         self.complete = trajectory.model.level(()).modes >= self.structure.n
         self.contacts = [element for element in self.elements if isinstance(element, UnilateralContact)]
@@ -272,6 +308,18 @@ class _Run:
         slowest = 0.0 if self.laws else 2 * np.pi * float(np.min(self.trajectory.model.level(()).frequencies))
         reach = self.length + self.acceleration * min(self.trajectory.t_end, 1 / max(slowest, 1e-300)) ** 2
         return float(np.sqrt(BOUNCE * reach * self.acceleration)) + BRIEF * self.acceleration * self.trajectory.t_end
+
+    def grid(self, samples: int) -> tuple[np.ndarray, np.ndarray]:
+        """Times (k,) [s] inside the first and the last segments, and the segment (k,) of each."""
+        wide = np.flatnonzero(np.diff(self.bounds) > SHORTEST * self.trajectory.t_end)
+        half = SEGMENTS // 2
+        chosen = np.concatenate([wide[:half], wide[max(half, len(wide) - half) :]])
+        lengths = np.diff(self.bounds)[chosen]
+        needed = 8 + PER_PERIOD * lengths * self.fastest / (2 * np.pi)
+        counts = np.maximum(8, needed * min(1.0, samples / np.sum(needed))).astype(int)
+        owner = np.repeat(chosen, counts)
+        inside = np.concatenate([np.clip(np.linspace(0, 1, count), NEAR_END, 1 - NEAR_END) for count in counts])
+        return self.bounds[owner] + inside * np.diff(self.bounds)[owner], owner
 
     def forces(self, times: np.ndarray) -> list[np.ndarray]:
         """Forces (n, k) of every load."""
@@ -427,7 +475,7 @@ def _derivatives(run: _Run, inside: _Inside) -> list[str]:
     middle = inside.ends.mean(axis=1)
     found = []
     for name, ends, rate, exact, size in (
-        ("velocity", inside.x_ends, inside.v, EXACT, run.length),
+        ("velocity", inside.x_ends, inside.v, max(EXACT, run.asked), run.length),
         ("acceleration", inside.v_ends, inside.a, run.exact, run.speed),
     ):
         change = np.abs(np.diff(ends, axis=2)[:, :, 0] - inside.per_interval(rate)) * run.root
@@ -533,6 +581,111 @@ def _laws(run: _Run, inside: _Inside) -> list[str]:
         size = np.max(np.abs(law.forces)) + np.max(np.abs(law.slopes)) * np.max(run.contact_terms(law, inside.x))
         found += _told(f"law of {law.name}", np.abs(N + F), EXACT * size, inside.times)
     return found
+
+
+def _switching(run: _Run, inside: _Inside, grid: tuple[np.ndarray, np.ndarray]) -> list[str]:
+    """An element stays within the range of its state all over the run, and whatever changes it is an event."""
+    found = []
+    trajectory, times = run.trajectory, grid[0]
+    for contact in run.contacts:
+        name = contact.name
+        closed = _within(times, np.array(trajectory.contact_intervals(name)).reshape(-1, 2))
+        at, round_off = _lowest(partial(_apart, run, contact), grid, ~closed), _gap_round_off(run, contact)
+        if run.complete:
+            found += _told(f"{name} is open inside its stop", -at[1], round_off, at[0])
+        else:
+            deep = max(round_off, -trajectory.deepest_gap(name) / REPORTED)
+            found += _told(f"{name} is open inside its stop, deeper than reported", -at[1], deep, at[0])
+        force = run.exact * float(np.max(_along(run, run.rows[name], inside.terms)))
+        if contact.rigid or contact.damping:
+            at = _lowest(partial(trajectory.contact_force, name), grid, closed)
+            found += _told(f"{name} pulls", -at[1], force, at[0])
+        elif run.complete:
+            at = _lowest(partial(_apart, run, contact, sign=-1.0), grid, closed)
+            found += _told(f"{name} is closed outside its stop", -at[1], round_off, at[0])
+    for element in run.rubbing if run.complete else ():
+        name = element.name
+        sticks = _within(times, trajectory.stick_intervals(name))
+        allowed = run.exact * float(np.max(_along(run, run.along[name], inside.terms)))
+        if isinstance(element, UnilateralContact):
+            allowed += element.most * run.exact * float(np.max(_along(run, run.rows[name], inside.terms)))
+        at = _lowest(partial(_reserve, trajectory, element), grid, sticks)
+        found += _told(f"{name} sticks beyond its limit", -at[1], allowed, at[0])
+    for element in run.springs:
+        found += _switches_without_event(run, element)
+    return found
+
+
+def _switches_without_event(run: _Run, element: UnilateralContact | Friction) -> list[str]:
+    """Whether something closes, opens, sticks or slips where no event tells it."""
+    trajectory, name = run.trajectory, element.name
+    intervals = [] if isinstance(element, Friction) else [np.array(trajectory.contact_intervals(name)).reshape(-1, 2)]
+    intervals += [trajectory.stick_intervals(name)] if element in run.rubbing else []
+    edges = np.unique(np.concatenate([part.ravel() for part in intervals]))
+    edges = edges[(edges > trajectory.t_start) & (edges < trajectory.t_end)]
+    own = np.array([event.time for event in trajectory.events if event.contact == name])
+    away = [float(np.min(np.abs(own - edge), initial=np.inf)) for edge in edges]
+    return _told(f"{name} switches without an event", np.array(away), BRIEF * trajectory.t_end, edges, "the time")
+
+
+def _within(times: np.ndarray, intervals: np.ndarray) -> np.ndarray:
+    """Whether (k,) the times are in one of the intervals (m, 2)."""
+    if not len(intervals):
+        return np.zeros(len(times), bool)
+    before = np.searchsorted(intervals[:, 0], times, side="right") - 1
+    return (before >= 0) & (times <= intervals[before, 1])
+
+
+def _lowest(
+    signal: Callable[[np.ndarray], Any], grid: tuple[np.ndarray, np.ndarray], where: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values of a signal on a part of the grid, and at its lowest places between the instants."""
+    times, owner = grid[0][where], grid[1][where]
+    if not len(times):
+        return times, times
+    values = np.asarray(signal(times))
+    joined = np.append(np.diff(owner) == 0, False)
+    left, right = np.roll(joined, 1), joined
+    local = ~(left & (np.roll(values, 1) < values)) & ~(right & (np.roll(values, -1) < values))
+    places = np.flatnonzero(local)
+    for i in places[np.argsort(values[places], kind="stable")[:LOWEST]]:
+        low, high = times[i - 1] if left[i] else times[i], times[i + 1] if right[i] else times[i]
+        for _ in range(ROUNDS):
+            t = np.linspace(low, high, POLISH)
+            found = np.asarray(signal(t))
+            j = int(np.argmin(found))
+            low, high = t[max(0, j - 1)], t[min(POLISH - 1, j + 1)]
+        times, values = np.append(times, t[j]), np.append(values, found[j])
+    return times, values
+
+
+def _apart(run: _Run, contact: UnilateralContact, times: np.ndarray, sign: float = 1.0) -> np.ndarray:
+    """g, of a viscous contact g + (c/k) max(0, g'), (k,) [m]: by its law it is closed where that is negative."""
+    z, z_rate = run.stop(contact, times)
+    row = run.rows[contact.name]
+    gap = np.asarray(run.trajectory.at(row, times)) + contact.gap - z
+    if not contact.damping:
+        return sign * gap
+    rate = np.asarray(run.trajectory.at(row, times, derivative=1)) - z_rate
+    return sign * np.asarray(gap + contact.damping / contact.stiffness * np.maximum(0.0, rate))
+
+
+def _gap_round_off(run: _Run, contact: UnilateralContact) -> float:
+    """What of ``_apart`` [m] is round-off."""
+    z, z_rate = run.stop(contact, run.instants)
+    length = float(run.length_of(contact, run.x_sides[1], z))
+    if contact.damping:
+        speed = run.speed * float(np.sum(np.abs(run.rows[contact.name]) / run.root.ravel())) + np.max(np.abs(z_rate))
+        length += run.exact * contact.damping / contact.stiffness * speed
+    return length
+
+
+def _reserve(trajectory: Trajectory, element: UnilateralContact | Friction, times: np.ndarray) -> np.ndarray:
+    """Static limit less |T|, (k,) [N]."""
+    tension = np.abs(np.asarray(trajectory.friction_force(element.name, times)))
+    if isinstance(element, Friction):
+        return element.most - tension
+    return element.most * np.asarray(trajectory.contact_force(element.name, times)) - tension
 
 
 def _instants(run: _Run) -> list[str]:
@@ -643,6 +796,14 @@ def _energies(run: _Run, inside: _Inside | None) -> list[str]:
     for name in ("impact", "damping", "friction", "truncation_kinetic"):
         allowed = ENERGY * scale + returned.get(name, 0.0)
         found += _told(f"ledger row {name} is negative", np.array([-getattr(ledger, name)]), allowed, at, "its rows")
+    losses = total_loss(trajectory.events) + trajectory.start_loss
+    for name in ("impact", "truncation_kinetic", "truncation_strain"):
+        lost, row = getattr(losses, name), getattr(ledger, name)
+        off = max(abs(lost - row), abs(row) if run.complete and name != "impact" else 0.0)
+        found += _told(f"ledger row {name} is not that of the events", np.array([off]), ENERGY * scale, at, "its rows")
+    rise = _rise(run)
+    if rise is not None:
+        found += _told("energy rises", np.array([rise]), ENERGY * scale, at, "energies")
     happened = event_table(trajectory.events, trajectory.model.index)[:, 0]
     after = len(happened) and happened[-1] == end  # the last energy is that after the event
     if run.complete and trajectory.status == "ok" and not after and not trajectory.model.overrides:
@@ -650,6 +811,21 @@ def _energies(run: _Run, inside: _Inside | None) -> list[str]:
         off = np.array([abs(own - ledger.final)])
         found += _told("energy at the end", off, ENERGY * scale + either, at, "energies")
     return found
+
+
+def _rise(run: _Run) -> float | None:
+    """``energy_rise``."""
+    trajectory = run.trajectory
+    if run.varies:
+        return None
+    times, owner = run.grid(10 * SEGMENTS)
+    ends = np.append(trajectory.t_start, times)
+    moved = np.asarray(trajectory.displacement(ends))
+    force = sum((f[:, 0] for f in run.forces(ends[:1])), np.zeros(run.structure.n))
+    left = np.asarray(trajectory.energy(times)) - (force @ (moved - moved[:, :1]))[1:]
+    rises = np.diff(left) if run.complete else np.diff(left)[np.diff(owner) == 0]
+    returned = max([0.0, *(-event.loss.damping for event in trajectory.events)])  # by dampers, which mostly take
+    return max(0.0, float(np.max(rises, initial=0.0)) - returned)
 
 
 def _stored_inside(run: _Run) -> float:
