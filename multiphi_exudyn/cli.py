@@ -441,9 +441,15 @@ def _stability(options: Options) -> bool:
     from tqdm import tqdm
 
     from multiphi_exudyn.study.runs import environment
-    from multiphi_exudyn.study.stability.catalogue_run import FULL_LENGTH, QUICK, chosen_cases, run_case
-    from multiphi_exudyn.study.stability.report import render_stability, text_table
-    from multiphi_exudyn.study.stability.summary import contents
+    from multiphi_exudyn.study.stability import (
+        FULL_LENGTH,
+        QUICK,
+        chosen_cases,
+        contents,
+        render_stability,
+        run_case,
+        text_table,
+    )
 
     cases = chosen_cases(options.case, options.quick)
     folder = _folder(options.out or Path(f"multiphi-stability{'-quick' if options.quick else ''}"))

@@ -133,9 +133,12 @@ def lawful_rise(trajectory: Trajectory) -> str:
     returned = -sum(min(0.0, event.loss.damping) for event in trajectory.events)
     given = -sum(min(0.0, event.loss.truncation_strain) for event in trajectory.events)
     belts = [getattr(e, "velocity", 0.0) or getattr(e, "tangential_velocity", 0.0) for e in trajectory.model.contacts]
+    ledger = trajectory.ledger
+    small = ENERGY * max(abs(ledger.initial), abs(ledger.work_of_loads), abs(ledger.final))
     causes = {
-        f"a damped stop that closes again inside gives back {returned:.3g} J that its spring had stored": returned > 0,
-        f"transitions between truncated levels store {given:.3g} J": given > 0,
+        f"a damped stop that closes again inside gives back {returned:.3g} J that its spring had stored": returned
+        > small,
+        f"transitions between truncated levels store {given:.3g} J": given > small,
         "the counter-surfaces do work": any(belts),
     }
     return "; ".join(cause for cause, holds in causes.items() if holds)

@@ -26,8 +26,7 @@ from multiphi_exudyn.study.runners import run_model
 from multiphi_exudyn.study.runs import from_arrays, to_arrays
 from multiphi_exudyn.study.scene import load_scene
 from multiphi_exudyn.study.setup import prepare
-from multiphi_exudyn.study.stability.outcome import CaseResult, Outcome
-from multiphi_exudyn.study.stability.report import text_table
+from multiphi_exudyn.study.stability import CaseResult, Outcome, text_table
 from multiphi_exudyn.time.model_warnings import grouped, issue, kept_back
 from multiphi_exudyn.time.trajectory import Trajectory
 from reference_models.solver_settings import fixed_steps
