@@ -28,48 +28,29 @@ Every bound is relative to the absolute values of the terms that are summed.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
-import scipy.sparse
 from scipy.optimize import lsq_linear
 
 from multiphi_exudyn.events.transitions.state import event_table, total_loss
 from multiphi_exudyn.mechanics.contact import UnilateralContact
-from multiphi_exudyn.mechanics.damping import ModalDamping
 from multiphi_exudyn.mechanics.element import Element
-from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.mechanics.friction import Friction
-from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
-from multiphi_exudyn.mechanics.structure import damping_matrix
-from multiphi_exudyn.mechanics.time_functions import Harmonic
-from multiphi_exudyn.study.given_motions import approximated, forces_at, stop_motion
+from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.study.judged_run import BRIEF, FAR, NODES, SEGMENTS, Inside, JudgedRun
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["broken_laws", "energy_rise", "lawful_rise"]
 
 INTERVALS = 20  # short intervals within segments, on each of which the laws are checked at NODES instants
-NODES = 6  # of Gauss quadrature, which integrates over an interval of at most one radian exactly
 IMPULSES = 3  # of the intervals over which the forces of contacts are integrated
-EVENTS = 20  # instants of events, and as many ends of segments
-EVEN = 10  # further instants, for the size of the motion
 EXACT = 1e-8  # of the terms of a sum: larger is no round-off
-INTERPOLATED = 1e-4  # the same where a load is interpolated: its tolerance holds for the motion, not for the force
-FAR = 1e-2  # of the largest displacement: its round-off is that of what other masses do not move; of a load's largest
-# force the same, where it is about zero
 MOVES = 1e-6  # of the largest velocity: slower slip has no direction
 ENERGY = 1e-8  # of the energies turned over
-NO_MOTION = 1e-6  # of what the forces could move a free mass during the run: less is no motion
 TOUCHES = 1e-13  # of a gap's terms: less is none
-BRIEF = 1e-11  # of the run: the same of a shorter bounce
-BOUNCE = 1e-11  # of the largest displacement: a lower bounce may be no more resolved
-SHORTEST = 1e-10  # of the run: a shorter segment is not looked into
 SAMPLES = 20_000  # instants of the grid all over the run
-SEGMENTS = 60  # segments that it covers: the first and the last ones
-PER_PERIOD = 24  # of its instants in the shortest period, if there are as many
-NEAR_END = 1e-9  # of a segment: how near to its ends the grid comes
 LOWEST = 8  # places at which a lowest value is looked for between the instants
 POLISH, ROUNDS = 41, 3  # instants around such a place, so many times over
 REPORTED = 0.5  # of a depth that is found: less must not be reported; both are sampled
@@ -110,7 +91,7 @@ def broken_laws(
     """
     if not trajectory.segments:
         return []
-    run = _Run(trajectory, tuple(loads), start, exact)
+    run = JudgedRun(trajectory, tuple(loads), start, exact)
     inside = run.inside(intervals, np.random.default_rng(seed))
     found: list[str] = []
     if inside is not None:
@@ -125,7 +106,7 @@ def energy_rise(trajectory: Trajectory, loads: Sequence[Load] = ()) -> float | N
 
     In a truncated model within segments alone: at an event the next level's modes may store energy.
     """
-    return _rise(_Run(trajectory, tuple(loads), None, EXACT)) if trajectory.segments else 0.0
+    return _rise(JudgedRun(trajectory, tuple(loads), None, EXACT)) if trajectory.segments else 0.0
 
 
 def lawful_rise(trajectory: Trajectory) -> str:
@@ -136,265 +117,11 @@ def lawful_rise(trajectory: Trajectory) -> str:
     ledger = trajectory.ledger
     small = ENERGY * max(abs(ledger.initial), abs(ledger.work_of_loads), abs(ledger.final))
     causes = {
-        f"a damped stop that closes again inside gives back {returned:.3g} J that its spring had stored": returned
-        > small,
+        f"a damped stop that closes again inside gives back {returned:.3g} J of its spring": returned > small,
         f"transitions between truncated levels store {given:.3g} J": given > small,
         "the counter-surfaces do work": any(belts),
     }
     return "; ".join(cause for cause, holds in causes.items() if holds)
-
-
-@dataclass(frozen=True)
-class _Inside:
-    """Intervals (k, 2) [s] within segments, their Gauss nodes times (k * NODES,) and weights, and there x, x', x''.
-
-    contact, friction: N or -F, and T (k * NODES,) by names.
-    """
-
-    run: _Run
-    ends: np.ndarray
-    times: np.ndarray
-    weights: np.ndarray
-    x: np.ndarray
-    v: np.ndarray
-    a: np.ndarray
-    x_ends: np.ndarray
-    v_ends: np.ndarray
-    contact: dict[str, np.ndarray]
-    friction: dict[str, np.ndarray]
-
-    @cached_property
-    def terms(self) -> np.ndarray:
-        """Absolute terms (n, k * NODES) of the equation of motion over the roots of the masses (``_force_terms``)."""
-        return _force_terms(self.run, self)
-
-    def worst(self, values: np.ndarray) -> np.ndarray:
-        """Largest absolute value (..., k * NODES) on the interval of every node, its ends not included."""
-        shaped = np.abs(values).reshape(*values.shape[:-1], -1, NODES)
-        return np.repeat(np.max(shaped, axis=-1), NODES, axis=-1)
-
-    def per_interval(self, values: np.ndarray) -> np.ndarray:
-        """Integral (..., k) over each interval of values (..., k * NODES) at the nodes."""
-        return (values * self.weights).reshape(*values.shape[:-1], -1, NODES).sum(axis=-1)
-
-
-class _Run:
-    """A trajectory with what it was given: matrices, rows and forces."""
-
-    def __init__(
-        self,
-        trajectory: Trajectory,
-        loads: tuple[Load, ...],
-        start: tuple[np.ndarray, np.ndarray] | None,
-        exact: float,
-    ) -> None:
-        self.trajectory, self.loads, self.start = trajectory, loads, start
-        self.structure, self.elements = trajectory.model.structure, trajectory.model.contacts
-        self.mass, self.stiffness = self.structure.mass, self.structure.stiffness
-        self._kept: dict[tuple[int, ...], np.ndarray] = {}
-        self.root = np.sqrt(np.asarray(self.mass.diagonal(), float))[:, None]
-        self.asked = exact
-        self.exact = max(exact, INTERPOLATED) if approximated(loads) else exact
-        self.complete = trajectory.model.level(()).modes >= self.structure.n
-        self.contacts = [element for element in self.elements if isinstance(element, UnilateralContact)]
-        self.frictions = [element for element in self.elements if isinstance(element, Friction)]
-        self.laws = [element for element in self.elements if isinstance(element, ForceLaw)]
-        self.rough = [c for c in self.contacts if c.tangential is not None and c.most]
-        self.pressing: list[UnilateralContact | ForceLaw] = [*self.contacts, *self.laws]
-        self.rubbing: list[UnilateralContact | Friction] = [*self.rough, *self.frictions]
-        self.springs: list[UnilateralContact | Friction] = [*self.contacts, *self.frictions]
-        self.rows = {element.name: self.structure.row(element.direction) for element in self.elements}
-        self.along = {c.name: self.structure.row(c.tangential) for c in self.rough if c.tangential is not None}
-        self.along |= {friction.name: self.rows[friction.name] for friction in self.frictions}
-
-    @cached_property
-    def damping(self) -> np.ndarray | scipy.sparse.sparray | None:
-        """C (n, n), None for none."""
-        return damping_matrix(self.structure)
-
-    @property
-    def varies(self) -> bool:
-        """Whether loads, stops or counter-surfaces move or change in time."""
-        moves = any(getattr(e, "velocity", 0.0) or getattr(e, "tangential_velocity", 0.0) for e in self.elements)
-        return moves or not all(isinstance(load, (ConstantLoad, Gravity)) for load in self.loads)
-
-    @property
-    def has_equation(self) -> bool:
-        """Whether M, C and K are those of the motion: no measured levels, no damping that is known by modes alone."""
-        modal = isinstance(self.structure.damping, ModalDamping) and scipy.sparse.issparse(self.stiffness)
-        return not modal and not self.trajectory.model.overrides
-
-    @cached_property
-    def bounds(self) -> np.ndarray:
-        """Starts and ends (s + 1,) of the segments [s]."""
-        return np.append(self.trajectory.segments.starts, self.trajectory.t_end)
-
-    @cached_property
-    def instants(self) -> np.ndarray:
-        """Times (k,) [s] of some events and of some ends of segments, at most EVENTS of each, and EVEN even ones.
-
-        Without the end of the run, after which a trajectory tells no motion.
-        """
-        run = self.trajectory
-        happened = event_table(run.events, run.model.index)[:, 0]
-        chosen = [np.unique(times) for times in (happened, self.bounds)]
-        chosen = [t[np.linspace(0, len(t) - 1, min(EVENTS, len(t))).astype(int)] for t in chosen]
-        even = np.linspace(run.t_start, run.t_end, EVEN)
-        near = np.abs(even[:, None] - np.concatenate(chosen)) < SHORTEST * run.t_end  # an event by round-off after it
-        times = np.unique(np.concatenate([even[~np.any(near, axis=1)], *chosen]))
-        return times[times < run.t_end]
-
-    @property
-    def has_both_sides(self) -> np.ndarray:
-        """Whether (k,) both sides of the instants are known: not of the first one where the start is not given."""
-        return (self.instants > self.trajectory.t_start) | (self.start is not None)
-
-    @cached_property
-    def x_sides(self) -> tuple[np.ndarray, np.ndarray]:
-        """x (n, k) at the instants from the left and the right."""
-        return self._sides(self.trajectory.displacement, 0)
-
-    @cached_property
-    def v_sides(self) -> tuple[np.ndarray, np.ndarray]:
-        """x' (n, k) at the instants from the left and the right."""
-        return self._sides(self.trajectory.velocity, 1)
-
-    def _sides(self, values: Callable[..., Any], given: int) -> tuple[np.ndarray, np.ndarray]:
-        left, right = (np.asarray(values(self.instants, side)) for side in ("left", "right"))
-        first = self.instants <= self.trajectory.t_start
-        left[:, first] = right[:, first] if self.start is None else np.asarray(self.start[given], float)[:, None]
-        return left, right
-
-    @cached_property
-    def length(self) -> float:
-        """Largest sqrt(M_ii) |x_i| at the instants and way of a counter-surface, and what no motion is [m sqrt(kg)]."""
-        largest = float(np.max(np.abs(self.root * self.x_sides[1]), initial=0.0))
-        belts = [friction.velocity for friction in self.frictions] + [c.tangential_velocity for c in self.rough]
-        carried = float(np.max(np.abs(belts), initial=0.0)) * float(np.max(self.root))
-        velocity = NO_MOTION * float(np.max(np.abs(self.root * self.v_sides[1]), initial=0.0)) + self.idle
-        return largest + (carried + velocity) * self.trajectory.t_end
-
-    @cached_property
-    def speed(self) -> float:
-        """Largest sqrt(M_ii) |x'_i| at the instants, and what no motion is [m/s sqrt(kg)]."""
-        return float(np.max(np.abs(self.root * np.hstack(self.v_sides)), initial=0.0)) + self.idle
-
-    @cached_property
-    def acceleration(self) -> float:
-        """What the forces do at most to free masses [m/s2 sqrt(kg)]."""
-        x, v = np.abs(self.x_sides[1]), np.maximum(*np.abs(self.v_sides))
-        forces = sum((np.abs(f) for f in self.forces(self.instants)), abs(self.stiffness) @ x)
-        if self.has_equation and self.damping is not None:
-            forces = forces + abs(self.damping) @ v
-        pushing = [(friction.name, friction.most) for friction in self.frictions]
-        pushing += [(law.name, float(np.max(np.abs(law.force(self.rows[law.name] @ x))))) for law in self.laws]
-        pushing += [(c.name, c.stiffness * self._deepest(c)) for c in self.contacts if not c.rigid]
-        for name, force in pushing:
-            forces = forces + force * np.abs(self.rows[name])[:, None]
-        return float(np.max(forces / self.root, initial=0.0))
-
-    def _deepest(self, contact: UnilateralContact) -> float:
-        """How far [m] an instant is inside a stop, at most."""
-        return float(np.max(-np.asarray(self.trajectory.gap(contact.name, self.instants)), initial=0.0))
-
-    @property
-    def idle(self) -> float:
-        """The part of what the forces could do to free masses during the run that is no motion [m/s sqrt(kg)]."""
-        return NO_MOTION * self.acceleration * self.trajectory.t_end
-
-    @cached_property
-    def smallest_bounce(self) -> float:
-        """Velocity [m/s sqrt(kg)] of bounces that are no longer resolved, as their height is round-off.
-
-        Of displacements from equilibria too, to which the forces could move the structure.
-        """
-        slowest = 0.0 if self.laws else 2 * np.pi * float(np.min(self.trajectory.model.level(()).frequencies))
-        reach = self.length + self.acceleration * min(self.trajectory.t_end, 1 / max(slowest, 1e-300)) ** 2
-        return float(np.sqrt(BOUNCE * reach * self.acceleration)) + BRIEF * self.acceleration * self.trajectory.t_end
-
-    def grid(self, samples: int) -> tuple[np.ndarray, np.ndarray]:
-        """Times (k,) [s] inside the first and the last segments, and the segment (k,) of each."""
-        wide = np.flatnonzero(np.diff(self.bounds) > SHORTEST * self.trajectory.t_end)
-        half = SEGMENTS // 2
-        chosen = np.concatenate([wide[:half], wide[max(half, len(wide) - half) :]])
-        lengths = np.diff(self.bounds)[chosen]
-        needed = 8 + PER_PERIOD * lengths * self.fastest / (2 * np.pi)
-        counts = np.maximum(8, needed * min(1.0, samples / np.sum(needed))).astype(int)
-        owner = np.repeat(chosen, counts)
-        inside = np.concatenate([np.clip(np.linspace(0, 1, count), NEAR_END, 1 - NEAR_END) for count in counts])
-        return self.bounds[owner] + inside * np.diff(self.bounds)[owner], owner
-
-    def forces(self, times: np.ndarray) -> list[np.ndarray]:
-        """Forces (n, k) of every load."""
-        return forces_at(self.structure, self.loads, times, self.trajectory.t_end)
-
-    def stop(self, contact: UnilateralContact, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """z, z' (k,) of its stop."""
-        return stop_motion(self.structure, contact, self.loads, times, self.trajectory.t_end)
-
-    @cached_property
-    def fastest(self) -> float:
-        """A bound of the rates of the motion [rad/s]."""
-        rates = [2 * np.pi * self.trajectory.model.highest_frequency, 1e-300]
-        if self.has_equation and self.damping is not None:
-            rates.append(float(np.max(abs(self.damping).sum(axis=1) / self.root.ravel() ** 2)))
-        rates += [element.damping * self._mobility(element.name) for element in self.elements if element.damping]
-        courses = [getattr(load, "course", None) for load in self.loads]
-        rates += [2 * np.pi * course.frequency_hz for course in courses if isinstance(course, Harmonic)]
-        return max(rates)
-
-    def _mobility(self, name: str) -> float:
-        return float(np.sum((self.rows[name] / self.root.ravel()) ** 2))
-
-    def inside(self, intervals: int, random: np.random.Generator) -> _Inside | None:
-        """Intervals of at most one radian within segments: half of them anywhere, half in segments taken at random."""
-        run, bounds = self.trajectory, self.bounds
-        lengths = np.diff(bounds)
-        wide = np.flatnonzero(lengths > SHORTEST * run.t_end)
-        if not len(wide):
-            return None
-        anywhere = random.uniform(bounds[0], bounds[-1], intervals // 2)
-        owners = np.searchsorted(bounds, anywhere, side="right") - 1
-        chosen = np.concatenate([owners, random.choice(wide, intervals - len(owners))])
-        chosen = chosen[np.isin(chosen, wide)]
-        width = np.minimum(0.9 * lengths[chosen], 1.0 / self.fastest)
-        first = bounds[chosen] + 0.05 * lengths[chosen]
-        first = first + random.uniform(0, 1, len(chosen)) * (0.9 * lengths[chosen] - width)
-        order = np.argsort(first, kind="stable")
-        ends = np.column_stack([first, first + width])[order]
-        nodes, weights = np.polynomial.legendre.leggauss(NODES)
-        half = np.diff(ends, axis=1) / 2
-        times = (ends.mean(axis=1)[:, None] + half * nodes).ravel()
-        contacts = [element.name for element in self.pressing]
-        return _Inside(
-            run=self,
-            ends=ends,
-            times=times,
-            weights=(half * weights).ravel(),
-            x=run.displacement(times),
-            v=run.velocity(times),
-            a=np.asarray(run.acceleration(times)),
-            x_ends=run.displacement(ends.ravel()).reshape(self.structure.n, -1, 2),
-            v_ends=run.velocity(ends.ravel()).reshape(self.structure.n, -1, 2),
-            contact={name: np.asarray(run.contact_force(name, times)) for name in contacts},
-            friction={name: np.asarray(run.friction_force(name, times)) for name in self.along},
-        )
-
-    def length_of(self, contact: UnilateralContact, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """What of a contact's gaps (k,) [m] at x (n, k) is round-off."""
-        largest = self.length * float(np.max(np.abs(self.rows[contact.name]) / self.root.ravel()))
-        return self.exact * (np.max(self.contact_terms(contact, x) + np.abs(z)) + FAR * largest)
-
-    def contact_terms(self, element: Element, x: np.ndarray) -> np.ndarray:
-        """Absolute terms (k,) of h.x + gap."""
-        return np.abs(self.rows[element.name]) @ np.abs(x) + abs(element.gap)
-
-    def kept_modes(self, t: float) -> np.ndarray:
-        """Modes (n, r) of the level at an instant."""
-        level = self.trajectory.segments[int(np.searchsorted(self.bounds, t, side="right")) - 1].level.modal
-        if level.indices not in self._kept:
-            self._kept[level.indices] = level.shapes
-        return self._kept[level.indices]
 
 
 def _told(
@@ -412,42 +139,13 @@ def _told(
     ]
 
 
-def _force_terms(run: _Run, inside: _Inside) -> np.ndarray:
-    """Absolute terms (n, k) of the equation of motion over the roots of the masses: also those that springs make.
-
-    A load that passes through zero has there the round-off of its course, and balances forces that have it too.
-    """
-    x, v, a = (inside.worst(values) for values in (inside.x, inside.v, inside.a))
-    terms = abs(run.mass) @ a + abs(run.stiffness) @ x
-    for here, anywhere in zip(run.forces(inside.times), run.forces(run.instants), strict=True):
-        terms = terms + np.maximum(np.abs(here), FAR * np.max(np.abs(anywhere), axis=1, initial=0.0)[:, None])
-    if run.has_equation and run.damping is not None:
-        terms = terms + abs(run.damping) @ v
-    for law in run.laws:
-        reach = run.contact_terms(law, x) + np.max(np.abs(law.knots))
-        terms = terms + np.abs(run.rows[law.name])[:, None] * (np.max(np.abs(law.slopes)) * reach)
-    for element in run.springs:
-        row = np.abs(run.rows[element.name])
-        if np.isfinite(element.stiffness):
-            terms = terms + row[:, None] * (element.stiffness * run.contact_terms(element, x))
-        terms = terms + row[:, None] * (element.damping * (row @ v))
-    for contact in run.rough:
-        if np.isfinite(contact.tangential_stiffness):
-            row = np.abs(run.along[contact.name])
-            terms = terms + row[:, None] * (contact.tangential_stiffness * (row @ x))
-    for rows, told in ((run.rows, inside.contact), (run.along, inside.friction)):
-        for name, force in told.items():
-            terms = terms + np.abs(rows[name])[:, None] * inside.worst(force)
-    return terms / run.root
-
-
-def _along(run: _Run, row: np.ndarray, terms: np.ndarray) -> np.ndarray:
+def _along(run: JudgedRun, row: np.ndarray, terms: np.ndarray) -> np.ndarray:
     """What force (k,) [N] along a row the terms (n, k) over the roots of the masses are."""
     weighted = np.abs(row) / run.root.ravel()
     return np.max(terms, axis=0) * np.sum(weighted) / float(weighted @ weighted)
 
 
-def _motion(run: _Run, inside: _Inside) -> list[str]:
+def _motion(run: JudgedRun, inside: Inside) -> list[str]:
     """M x'' + C x' + K x - f - sum h N + sum h_t T = 0, of a truncated model in the modes that it keeps.
 
     Where inputs vary these models leave out the damping of the quasi-static motion that their modes do not contain.
@@ -473,7 +171,7 @@ def _motion(run: _Run, inside: _Inside) -> list[str]:
     return _told("equation of motion in the kept modes", off, allowed, inside.times)
 
 
-def _derivatives(run: _Run, inside: _Inside) -> list[str]:
+def _derivatives(run: JudgedRun, inside: Inside) -> list[str]:
     """Velocities and accelerations integrate to changes of displacement and velocity."""
     middle = inside.ends.mean(axis=1)
     found = []
@@ -488,7 +186,7 @@ def _derivatives(run: _Run, inside: _Inside) -> list[str]:
     return found
 
 
-def _impulses_of_forces(run: _Run, inside: _Inside) -> list[str]:
+def _impulses_of_forces(run: JudgedRun, inside: Inside) -> list[str]:
     """The impulse of a contact over a few intervals is the integral of its force."""
     found = []
     chosen = np.arange(0, len(inside.ends), max(1, len(inside.ends) // IMPULSES))
@@ -500,7 +198,7 @@ def _impulses_of_forces(run: _Run, inside: _Inside) -> list[str]:
     return found
 
 
-def _contacts(run: _Run, inside: _Inside) -> list[str]:
+def _contacts(run: JudgedRun, inside: Inside) -> list[str]:
     """The law of every contact."""
     found = []
     forces = inside.contact
@@ -532,7 +230,7 @@ def _contacts(run: _Run, inside: _Inside) -> list[str]:
     return found
 
 
-def _frictions(run: _Run, inside: _Inside) -> list[str]:
+def _frictions(run: JudgedRun, inside: Inside) -> list[str]:
     """|T| within its limit, at it and against the slip where the patch slips."""
     found = []
     for element in run.rubbing:
@@ -559,7 +257,7 @@ def _frictions(run: _Run, inside: _Inside) -> list[str]:
 
 
 def _slip(
-    run: _Run, inside: _Inside, row: np.ndarray, T: np.ndarray, spring: float, belt: float
+    run: JudgedRun, inside: Inside, row: np.ndarray, T: np.ndarray, spring: float, belt: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Slip (k,) at the nodes and its round-off: a velocity, with a spring the way over the interval of the node."""
     size = run.speed * float(np.max(np.abs(row) / run.root.ravel())) + abs(belt)
@@ -573,7 +271,7 @@ def _slip(
     return way, MOVES * size * lasted + EXACT * np.max(terms)
 
 
-def _laws(run: _Run, inside: _Inside) -> list[str]:
+def _laws(run: JudgedRun, inside: Inside) -> list[str]:
     """The force of every force law is that of its displacement."""
     found = []
     for law in run.laws if run.complete else ():
@@ -586,7 +284,7 @@ def _laws(run: _Run, inside: _Inside) -> list[str]:
     return found
 
 
-def _switching(run: _Run, inside: _Inside, grid: tuple[np.ndarray, np.ndarray]) -> list[str]:
+def _switching(run: JudgedRun, inside: Inside, grid: tuple[np.ndarray, np.ndarray]) -> list[str]:
     """An element stays within the range of its state all over the run, and whatever changes it is an event."""
     found = []
     trajectory, times = run.trajectory, grid[0]
@@ -619,7 +317,7 @@ def _switching(run: _Run, inside: _Inside, grid: tuple[np.ndarray, np.ndarray]) 
     return found
 
 
-def _switches_without_event(run: _Run, element: UnilateralContact | Friction) -> list[str]:
+def _switches_without_event(run: JudgedRun, element: UnilateralContact | Friction) -> list[str]:
     """Whether something closes, opens, sticks or slips where no event tells it."""
     trajectory, name = run.trajectory, element.name
     intervals = [] if isinstance(element, Friction) else [np.array(trajectory.contact_intervals(name)).reshape(-1, 2)]
@@ -662,7 +360,7 @@ def _lowest(
     return times, values
 
 
-def _apart(run: _Run, contact: UnilateralContact, times: np.ndarray, sign: float = 1.0) -> np.ndarray:
+def _apart(run: JudgedRun, contact: UnilateralContact, times: np.ndarray, sign: float = 1.0) -> np.ndarray:
     """g, of a viscous contact g + (c/k) max(0, g'), (k,) [m]: by its law it is closed where that is negative."""
     z, z_rate = run.stop(contact, times)
     row = run.rows[contact.name]
@@ -673,7 +371,7 @@ def _apart(run: _Run, contact: UnilateralContact, times: np.ndarray, sign: float
     return sign * np.asarray(gap + contact.damping / contact.stiffness * np.maximum(0.0, rate))
 
 
-def _gap_round_off(run: _Run, contact: UnilateralContact) -> float:
+def _gap_round_off(run: JudgedRun, contact: UnilateralContact) -> float:
     """What of ``_apart`` [m] is round-off."""
     z, z_rate = run.stop(contact, run.instants)
     length = float(run.length_of(contact, run.x_sides[1], z))
@@ -691,7 +389,7 @@ def _reserve(trajectory: Trajectory, element: UnilateralContact | Friction, time
     return element.most * np.asarray(trajectory.contact_force(element.name, times)) - tension
 
 
-def _instants(run: _Run) -> list[str]:
+def _instants(run: JudgedRun) -> list[str]:
     """Displacements never jump, velocities by the impulses of rigid contacts, which leave their stops."""
     if not run.complete:
         return []
@@ -705,7 +403,7 @@ def _instants(run: _Run) -> list[str]:
     return found
 
 
-def _impulses(run: _Run, rigid: Sequence[UnilateralContact]) -> tuple[np.ndarray, np.ndarray]:
+def _impulses(run: JudgedRun, rigid: Sequence[UnilateralContact]) -> tuple[np.ndarray, np.ndarray]:
     """Impulses (c, k) [N s] of rigid contacts at the instants, and how many impacts (k,) each instant has."""
     times = {t: k for k, t in enumerate(run.instants.tolist())}
     places = {contact.name: i for i, contact in enumerate(rigid)}
@@ -719,7 +417,7 @@ def _impulses(run: _Run, rigid: Sequence[UnilateralContact]) -> tuple[np.ndarray
     return impulses, counts
 
 
-def _momentum(run: _Run, rigid: Sequence[UnilateralContact], impulses: np.ndarray) -> list[str]:
+def _momentum(run: JudgedRun, rigid: Sequence[UnilateralContact], impulses: np.ndarray) -> list[str]:
     """M (x'+ - x'-) = sum h p - sum h_t q, p >= 0, |q| <= mu p."""
     found = []
     rest = (run.mass @ (run.v_sides[1] - run.v_sides[0])) / run.root
@@ -741,14 +439,14 @@ def _momentum(run: _Run, rigid: Sequence[UnilateralContact], impulses: np.ndarra
     return found + _told("balance of momentum", np.max(np.abs(rest), axis=0), allowed, run.instants, "momenta")
 
 
-def _touches(run: _Run, contact: UnilateralContact) -> np.ndarray:
+def _touches(run: JudgedRun, contact: UnilateralContact) -> np.ndarray:
     """Whether (k,) a contact is at its stop at the instants."""
     z, _ = run.stop(contact, run.instants)
     gap = run.rows[contact.name] @ run.x_sides[1] + contact.gap - z
     return np.asarray(np.abs(gap) <= TOUCHES / run.exact * run.length_of(contact, run.x_sides[1], z))
 
 
-def _is_struck_next(run: _Run, contact: UnilateralContact, speed: np.ndarray) -> np.ndarray:
+def _is_struck_next(run: JudgedRun, contact: UnilateralContact, speed: np.ndarray) -> np.ndarray:
     """Whether (k,) the contact is struck before it has gone on with these speeds for more than round-off of its gap.
 
     A load may change where a mass arrives: what is left of the gap is round-off, and the impact comes just afterwards.
@@ -761,7 +459,7 @@ def _is_struck_next(run: _Run, contact: UnilateralContact, speed: np.ndarray) ->
     return np.asarray(speed <= length / (following - times))
 
 
-def _rebounds(run: _Run, contact: UnilateralContact, impulse: np.ndarray, alone: np.ndarray) -> list[str]:
+def _rebounds(run: JudgedRun, contact: UnilateralContact, impulse: np.ndarray, alone: np.ndarray) -> list[str]:
     """The contact does not go on into its stop; struck alone and once it leaves it with -e times its velocity."""
     row, name, times = run.rows[contact.name], contact.name, run.instants
     scaled = np.abs(row) / run.root.ravel()
@@ -778,7 +476,7 @@ def _rebounds(run: _Run, contact: UnilateralContact, impulse: np.ndarray, alone:
     return found
 
 
-def _energies(run: _Run, inside: _Inside | None) -> list[str]:
+def _energies(run: JudgedRun, inside: Inside | None) -> list[str]:
     """The ledger is closed, what is lost is not negative, and the energies at both ends are those of the motion."""
     trajectory, ledger = run.trajectory, run.trajectory.ledger
     end = trajectory.t_end
@@ -816,7 +514,7 @@ def _energies(run: _Run, inside: _Inside | None) -> list[str]:
     return found
 
 
-def _rise(run: _Run) -> float | None:
+def _rise(run: JudgedRun) -> float | None:
     """``energy_rise``."""
     trajectory = run.trajectory
     if run.varies:
@@ -831,7 +529,7 @@ def _rise(run: _Run) -> float | None:
     return max(0.0, float(np.max(rises, initial=0.0)) - returned)
 
 
-def _stored_inside(run: _Run) -> float:
+def _stored_inside(run: JudgedRun) -> float:
     """Energy [J] of viscous contacts that start open inside their stop: damping gives it back if they close there."""
     first, stored = np.array([run.trajectory.t_start]), 0.0
     for contact in run.contacts:
@@ -841,7 +539,7 @@ def _stored_inside(run: _Run) -> float:
     return stored
 
 
-def _energy_terms(run: _Run, x: np.ndarray, v: np.ndarray) -> float:
+def _energy_terms(run: JudgedRun, x: np.ndarray, v: np.ndarray) -> float:
     """Largest sum of the absolute terms of an energy [J]."""
     terms = 0.5 * np.sum(np.abs(v) * (abs(run.mass) @ np.abs(v)), axis=0)
     terms = terms + 0.5 * np.sum(np.abs(x) * (abs(run.stiffness) @ np.abs(x)), axis=0)
@@ -852,7 +550,7 @@ def _energy_terms(run: _Run, x: np.ndarray, v: np.ndarray) -> float:
     return float(np.max(terms))
 
 
-def _energy(run: _Run, trajectory: Trajectory, t: float) -> tuple[float, float]:
+def _energy(run: JudgedRun, trajectory: Trajectory, t: float) -> tuple[float, float]:
     """Kinetic and strain energy [J] at an instant, from x, x' and forces of friction springs.
 
     And the part of viscous contacts without a force, which may just be opening or open.

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from small_scene import changed, write
-from test_scenes import JUNK, places
 
 import multiphi_exudyn.study.scene as scenes
 import multiphi_exudyn.study.study_file as cases
@@ -22,6 +21,21 @@ SHIPPED = {
     "scene": sorted(scenes.shipped().values()),
     "study": sorted((Path(cases.__file__).parent / "studies").glob("*.toml")),
 }
+
+
+def places(value, path=()):
+    """Paths of all entries of nested tables and arrays."""
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, item in items:
+        yield [*path, key]
+        yield from places(item, (*path, key))
+
+
+JUNK = st.recursive(
+    st.booleans() | st.integers(-(2**60), 2**60) | st.floats() | st.text('ab[]"\n\\{}.é', max_size=8),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text("abc", min_size=1), inner, max_size=3),
+    max_leaves=5,
+)
 HARD = st.sampled_from(
     [math.nan, math.inf, -math.inf, 0, -1, 10**18, -1e300, 5e-324, "", "é\u202e\0", "paper-rig", [], {}, [[]], True]
 )
