@@ -23,12 +23,12 @@ from multiphi_exudyn.mechanics.arguments import one_of
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.loads import FunctionLoad, HarmonicLoad, SampledLoad, SweepLoad
 from multiphi_exudyn.mechanics.structure import damping_matrix
-from multiphi_exudyn.study.report import environment_of
-from multiphi_exudyn.study.wording import seconds
 from multiphi_exudyn.study.law_check import broken_laws, energy_rise, lawful_rise
 from multiphi_exudyn.study.measures import nrmse
+from multiphi_exudyn.study.report import environment_of
 from multiphi_exudyn.study.runs import timed
 from multiphi_exudyn.study.sweep import TimeLimitExceeded, call_within
+from multiphi_exudyn.study.wording import seconds
 from multiphi_exudyn.time.model_warnings import grouped, kept_back
 from multiphi_exudyn.time.simulate import simulate
 from multiphi_exudyn.time.trajectory import Trajectory
