@@ -5,16 +5,14 @@
 Pieces are interpolated at Chebyshev points of the second kind, their ends among them, and halved until the interpolant
 agrees with the function at the points midway between, and at samples of the whole interval that are spread unevenly,
 the multiples of the golden ratio: no periodic function hides from them. Details shorter than the gaps between the
-samples, 1.2 / number of them, may be missed. A piece that does not converge is searched for a jump or a kink,
-and the pieces are built again with that instant as an end.
+samples, 1.2 / number of them, may be missed. A piece that does not converge is searched for a jump or a kink, and the
+pieces are built again with that instant as an end.
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice, 2013, ch. 2 and 16; V. T. Sos, On the
 distribution mod 1 of the sequence n alpha, Ann. Univ. Sci. Budapest 1 (1958) 127.
 
-Corners: instants at which a function of time jumps or has a kink, found to round-off.
-
-Beside a single corner the function continues a smooth one on either side. Both follow from the intervals before and
-after, u_-(t) and u_+(t), polynomials of degree SIDE_DEGREE; halving an interval by which of them is nearer to it
-leads to the corner, whether the value jumps there or its slope does:
+Corners are found to round-off. Beside a single corner the function continues a smooth one on either side. Both follow
+from the intervals before and after, u_-(t) and u_+(t), polynomials of degree SIDE_DEGREE; halving an interval by which
+of them is nearer to it leads to the corner, whether the value jumps there or its slope does:
 
     u(t) = u_-(t) for t < t_c,   u_+(t) for t >= t_c
 

@@ -13,10 +13,6 @@ the forces on its rows,
 is the error of the space, to first order.
 Source: P. Koutsovasilis, M. Beitelschmidt, Comparison of model reduction techniques for large mechanical systems,
 Multibody Syst. Dyn. 20 (2008) 111; the error of a Ritz value: B. N. Parlett, The Symmetric Eigenvalue Problem, ch. 11.
-
-Vectors that are orthonormal in the inner product of a matrix A, and Ritz modes in their space.
-
-Lanczos iterations for the lowest modes of sparse matrices, and the factors that they need.
 """
 
 from __future__ import annotations

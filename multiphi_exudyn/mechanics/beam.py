@@ -1,15 +1,11 @@
-"""Section: a prismatic piece of a Timoshenko beam, and the matrices of an element of it.
+"""Straight planar Timoshenko beam bending in x-z: its sections, point masses, clamp and points, and its matrices.
 
-The exact static stiffness of the Timoshenko beam, with the shear flexibility Phi = 12 EI / (k G A l^2), and the
-consistent mass of its cubic shape functions, rotary inertia included, in (w, theta) of the element's two ends
-(J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, 11.5).
+Two-node elements: the exact static stiffness of the Timoshenko beam, with the shear flexibility Phi = 12 EI / (k G A
+l^2), and the consistent mass of its cubic shape functions, rotary inertia included, in (w, theta) of the element's two
+ends (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, 11.5).
 
-Description of a straight planar beam: sections, point masses, a clamp and named points.
-
-Straight planar Timoshenko beam bending in x-z, as a linear structure.
-
-Two-node elements. Each node has the deflection w [m], positive along +z, and the rotation theta [rad],
-positive if w increases with x (theta = dw/dx without shear).
+Each node has the deflection w [m], positive along +z, and the rotation theta [rad], positive if w increases with x
+(theta = dw/dx without shear).
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Files of several arrays with names: NumPy .npz, MATLAB .mat, Nastran .op4.
+"""Matrix files: linear structures from matrices that finite element programs have written.
+
+Files of several arrays with names:
 
 .npz    ``numpy.savez``, or one sparse matrix by ``scipy.sparse.save_npz``
 .mat    MATLAB to version 7 by scipy; version 7.3 is HDF5, for which h5py is needed: the extra ``matlab``
@@ -8,7 +10,7 @@ A field of a MATLAB struct has the name "model.M". The array is selected by (fil
 array, if not by its name another quantity, or among the largest square ones the only one with a usual initial,
 variables before fields: M for mass; K for stiffness; C, D or B for damping.
 
-Text matrices of finite element programs: triplets of Abaqus and CalculiX, and Harwell-Boeing.
+Matrices in text:
 
     row column value                           Abaqus *MATRIX OUTPUT, FORMAT=COORDINATE; CalculiX .sti and .mas; Matrix
                                                Market without its banner, after a line of rows, columns and entries
@@ -23,7 +25,7 @@ matrices, as those of structures are.
 Sources: Abaqus Analysis User's Guide, 10.3.1; I. S. Duff, R. G. Grimes, J. G. Lewis, Users' guide for the
 Harwell-Boeing sparse matrix collection, RAL-92-086, 1992.
 
-Matrix files: linear structures from matrices that finite element programs have written.
+Endings:
 
 .mtx, .mtx.gz            Matrix Market, sparse or dense; of a symmetric matrix one triangle is enough
                          (R. F. Boisvert, R. Pozo, K. Remington, The Matrix Market exchange formats, NISTIR 5935, 1996)

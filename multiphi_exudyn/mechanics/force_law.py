@@ -13,8 +13,6 @@ those below. Each segment has two exits, at its ends, into the next segments. Kn
 out. F(q_m) is a constant force of every level. The strain energy is the integral of the segmented law from q_m. Beyond
 the span the last segments are continued.
 
-Lines of a law: the straight segments that approximate the function of a force law, or those of its table.
-
 The knots lie on the law, and the zero of F nearest to q = 0 is one of them. piecewise_linear_fit.py determines their
 number.
 """

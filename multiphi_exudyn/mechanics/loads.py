@@ -1,16 +1,14 @@
-"""Loads that vary: f(t) in M x'' + C x' + K x = f(t) (eq. 38.1), and functions for loads of all kinds.
+"""Loads: forces at points that vary or not, weight, and supports that move (eqs. 38.1, 38.4).
 
-A load has a point, with the row p, and a function of time (time_functions.py),
+A load that varies has a point, with the row p, and a function of time (time_functions.py),
 
     f(t) = p u(t)
 
-Static loads: constant forces at points, and weight.
+Static loads,
 
     f = p F,   f = M e g
 
-They are part of the asymptotic configuration of every level, so they are exact for any number of modes.
-
-Moving supports: stops and bases that move, the boundary values x_k(t) of (38.4).
+are part of the asymptotic configuration of every level, so they are exact for any number of modes.
 
 A moving stop changes a gap, g = h.x + gap - z(t). A moving base moves the whole structure, and x is the displacement
 relative to it:

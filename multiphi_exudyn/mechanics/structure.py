@@ -5,8 +5,6 @@
 M [kg, kg m2] symmetric positive definite, K [N/m, N m] symmetric positive semidefinite (rigid-body
 modes are allowed), C [N s/m, N m s] symmetric positive semidefinite. A *point* is a row p of n
 numbers: its value is p.x, and a force F at it acts as p F.
-
-Points of a structure: rows p of n numbers by name; the value of a point is p.x, a force F at it acts as p F.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ Each becomes a piecewise exponential (piecewise_exponential.py), for which the r
 harmonic and straight lines between samples are exact; a smooth function and a sweep are interpolated to their
 tolerance.
 
-Samples: a function of time by its values, or by those of its acceleration, with straight lines between them.
+Samples are joined by straight lines, of a function or of its acceleration.
 """
 
 from __future__ import annotations

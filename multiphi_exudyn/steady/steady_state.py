@@ -1,6 +1,4 @@
-"""Settled state: the steady state of a run under a harmonic load, with its amplitudes and contact times.
-
-Steady state: the response to which a run under a harmonic load settles, from the map of one period of the load.
+"""Steady state: the response to which a run under a harmonic load settles, from the map of one period of the load.
 
 The state at whole periods T of the load is a sequence, q = (s y, y', F / sqrt(k)) with s = max(omega, 2 pi / T), y in
 base coordinates, F the forces of springs k in series with friction,
@@ -12,12 +10,6 @@ run continues in chunks of periods until the states repeat to a tolerance. To sa
 Newton's method searches for the repeating state between chunks (shooting.py), and if it is an attractor the next chunk
 starts there. A chunk takes over the whole final state of the previous one, stick positions included. If a link sticks
 for ever, every stick position belongs to another response; the result is the one to which the start leads.
-
-Settling: a run continues in chunks of periods until its states repeat, with Newton's method between chunks.
-
-    q_k+1 = P(q_k),   P^p(q) = q
-
-q is the state at whole periods of the load, P one period of the run, p the order of the response (steady_state.py).
 """
 
 from __future__ import annotations

@@ -1,34 +1,31 @@
-"""Friction warnings: redundant contacts and friction, friction decided in turn, slip that truncation turns backwards.
+"""Contact warnings: redundant contacts and friction, slip that truncation turns backwards, impacts of a mesh.
 
 Of rigid contacts whose directions depend linearly on each other an independent set carries the load (core/law). How
 they share it is not unique, and if they rub differently neither is the motion.
 
 Friction without a spring whose row depends linearly on those of sticking friction beside it moves with that friction:
-its force is its kinetic limit, as in slip (core/law). Where one of them has a higher static limit, that one bears
-the load. Where several have, or where one has begun to slip and others stick for it, neither the distribution of the
-load nor the begin of slip is determined: two of equal limits F and static limits S slip at S + F here, and might at
-2 S. Nor is it at compliant contacts, whose limits change with their normal forces. Friction at rigid contacts is
-decided one contact after the other: where several change direction at one instant, their order may matter.
+its force is its kinetic limit, as in slip (core/law). Where one of them has a higher static limit, that one bears the
+load. Where several have, or where one has begun to slip and others stick for it, neither the distribution of the load
+nor the begin of slip is determined: two of equal limits F and static limits S slip at S + F here, and might at 2 S. Nor
+is it at compliant contacts, whose limits change with their normal forces. Friction at rigid contacts is decided one
+contact after the other: where several change direction at one instant, their order may matter.
 
-With a truncated basis friction in slip may have a speed s (h_t.x' - v_t - T'/k_t) < 0 against its slip (core/law):
-the modes of slip and those of stick do not move its place alike. There is a warning and no correction. The static
-residual of the modes left out, which corrects friction of constant limits, would follow the normal force here: a force
-that moves no mass and follows N' is not symmetric, and may create energy. More modes are the remedy.
+With a truncated basis friction in slip may have a speed s (h_t.x' - v_t - T'/k_t) < 0 against its slip (core/law): the
+modes of slip and those of stick do not move its place alike. There is a warning and no correction. The static residual
+of the modes left out, which corrects friction of constant limits, would follow the normal force here: a force that
+moves no mass and follows N' is not symmetric, and may create energy. More modes are the remedy.
 
-Impact warnings: impacts that lose as much energy as the mesh decides, and impacts with several answers.
+A rigid contact that is struck stops the effective mass m_e = 1 / sum over modes of (h.phi)^2, which loses (1 - e^2) m_e
+s^2 / 2. On a lumped mass the first modes give nearly all of the sum. On a continuum it grows with every mode, m_e and
+the loss are those of the mesh, and neither is one of the structure itself. Where the upper half of the kept modes has
+more than SPREAD of the sum, and the impacts have taken more than TAKEN of the energy, the run says so: on an exact bar
+of 20 to 200 elements and 6 to all modes, over 1 to 10 periods, every run that was off by more than 5 % was told, and
+none that was off by less than 1.5 %.
 
-A rigid contact that is struck stops the effective mass m_e = 1 / sum over modes of (h.phi)^2, which loses
-(1 - e^2) m_e s^2 / 2. On a lumped mass the first modes give nearly all of the sum. On a continuum it grows with every
-mode, m_e and the loss are those of the mesh, and neither is one of the structure itself. Where the upper half of the
-kept modes has more than SPREAD of the sum, and the impacts have taken more than TAKEN of the energy, the run says so:
-on an exact bar of 20 to 200 elements and 6 to all modes, over 1 to 10 periods, every run that was off by more than 5 %
-was told, and none that was off by less than 1.5 %.
-
-Impacts for which Coulomb's law has several solutions (coulomb_impacts.py); the run takes one.
-
-All rigid contacts that touch at the instant are considered, also those without an impulse in the chosen solution. Their
-impulses act in the level in which they are open; friction elsewhere without a spring has no impulse. With restitution
-the plastic impact that comes first is examined.
+Of impacts for which Coulomb's law has several solutions (coulomb_impacts.py) the run takes one. All rigid contacts that
+touch at the instant are considered, also those without an impulse in the chosen solution. Their impulses act in the
+level in which they are open; friction elsewhere without a spring has no impulse. With restitution the plastic impact
+that comes first is examined.
 """
 
 from __future__ import annotations

@@ -3,8 +3,6 @@
     x(t) = Phi_l eta(t) + x_inf,l,   eta(t) = Re V (c exp(lambda (t - t_k)))   on [t_k, t_k+1]
 
 All but energies are rows of (xi, xi', 1) in every level, which the subclasses define.
-
-History figure: displacements, contact forces below them, and in grey the times of closed or sticking contacts.
 """
 
 from __future__ import annotations

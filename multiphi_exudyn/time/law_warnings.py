@@ -1,4 +1,4 @@
-"""Law warnings: what the straight segments of a force law do to the motion of a run.
+"""Law warnings: what the straight segments of a force law do to the motion of a run, and laws driven out of their span.
 
 A law is known to a share of its largest force on the span. Its motion is not known to that share: e = F - segments has
 mostly one sign at one amplitude, so it changes the frequency, and the phase drifts for the whole run. For an
@@ -9,8 +9,6 @@ oscillation the balance of the first harmonic gives
 with q less its mean. The phase is off by d omega t, and displacements, as a root mean square over the run, by
 d omega T / sqrt(3). Against 152 random runs of the exact laws (cubic, Hertz, magnets, softening, one to four degrees of
 freedom) the ratio of this estimate to the error was 1.1 in the middle, and 0.5 to 2.3 for eight of ten.
-
-Law span: force laws that a motion drives out of the span on which they are given.
 
 Beyond its span the last segment of a law is continued. That is an extrapolation unless it is no force at all, and where
 the segment is falling the motion may grow without limit.

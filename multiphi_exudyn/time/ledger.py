@@ -1,6 +1,6 @@
-"""Ledger and statistics: the energy balance of a run, and its work in counts and bytes.
+"""Ledger: the energy balance of a run, its work in counts and bytes, and the final state from which it is continued.
 
-Final state: the state of a run where it stops, from which it is continued, and what its ledger is made of.
+initial + work of loads = final + losses, each side added up on its own
 """
 
 from __future__ import annotations

@@ -3,10 +3,7 @@
 The core advances a batch of runs at a time on its threads; levels are built once, for all. Every run is the same, to
 the bit, as a run alone, for any number of threads. Only the requested samples of a run are kept.
 
-Workers: the runs of one model from many starts, on all cores (many.py).
-
-The core does a batch of them at a time on its threads; what a run needs of Python, its start before it and its warnings
-after it, is done by one thread.
+What a run needs of Python, its start before it and its warnings after it, is done by one thread.
 """
 
 from __future__ import annotations

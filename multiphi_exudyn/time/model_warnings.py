@@ -1,13 +1,10 @@
-"""Warning groups: warnings are issued once, those of many runs grouped by kind.
+"""Model warnings: what to distrust in a model or its levels, known before a run; run_warnings.py lists the kinds.
 
-A kind is the text before a sentence's first colon (run_warnings.py).
+A kind is the text before a sentence's first colon. Warnings are issued once, those of many runs grouped by kind.
 
-Base warnings: the parts of a start, a row or the levels that the small base of a large structure leaves out.
-
-A start is judged in the norm of the mass matrix, a row by its static flexibility. The base of a run includes the rows
-of its loads (MultiPhiModel.holding), like contacts and points; a continued run keeps the base of its start.
-
-Model warnings: what to distrust in a model or its levels, known before a run; run_warnings.py lists the kinds.
+Of a large structure the small base leaves out parts of a start, of a row or of the levels. A start is judged in the
+norm of the mass matrix, a row by its static flexibility. The base of a run includes the rows of its loads
+(MultiPhiModel.holding), like contacts and points; a continued run keeps the base of its start.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
 """Motion: a run in progress, which the core advances from event to event.
 
-A failure ends the run early, with its cause.
-
-Failures: the cause that has stopped a run, as a sentence that names the contacts and what is needed.
-
-Chatter: more events in a short time than modes and loads can follow.
+A failure ends the run early, with its cause as a sentence that names the contacts and what is needed. Chatter, more
+events in a short time than modes and loads can follow, is one.
 """
 
 from __future__ import annotations

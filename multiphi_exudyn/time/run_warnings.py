@@ -25,8 +25,8 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "linear range: ..."       result of the model's own validity check
     "cluster: ..."            levels that keep more modes than asked for, so that no modes of one frequency are parted
     "base: ..."               motion or loads outside the base of a large structure (model_warnings.py)
-    "slow mode: ..."          a mode that rests so far away that its motion is lost in round-off, or so
-                              slow that its motion under varying loads is
+    "slow mode: ..."          a mode that rests so far away that its motion is lost in round-off, or so slow that its
+                              motion under varying loads is
     "load pieces: ..."        loads of so many samples or pieces that the run takes long
     "coarse steps: ..."       steps of Exudyn that delay the motion of modes not matched to them
     "truncated statics: ..."  what the modes leave out of a static solution of Exudyn under forces on a body's interface
@@ -34,7 +34,7 @@ Every warning is one plain sentence with its number. It begins with its kind and
     "rigid interface ...: "   a rigid interface of a body that turns beyond the linear range
     "slow model: ..."         modes that hardly begin to move in the run: matrices swapped, or units mixed
 
-Far rest: what a run loses because a level rests far away from where the structure moves.
+What a run loses because a level rests far away from where the structure moves ("slow mode"):
 
     eps |y_inf| sqrt(N + 1) > LOST |y|
 
@@ -47,7 +47,7 @@ LOST is calibrated on 1277 nearly free structures of the campaign (tests/campaig
 force: 71 displacements were off by a millionth and more, and had 7e-8 or more but for one of few digits and one that
 is sensitive by itself; right ones had 3e-8 at most. Extreme cases of the catalogue have less than 1e-11.
 
-Ledger warnings: a run whose energy balance is open, or in which friction, damping or impacts gave energy.
+An energy balance is open, or friction, damping or impacts gave energy ("open ledger"):
 
     |residual| > OPEN (|initial| + |work of loads| + |final| + sum of |losses|)
 
@@ -56,8 +56,8 @@ more only where they are small beside what the loads could give, of which ROUND_
 longer than the run and than the mode moves one way. A wrong force or a wrong impulse opens the ledger by its whole
 work. OPEN lies far from both.
 
-The core balances its sums when a run ends; only where it finds them open, or has left works out, the
-ledger is made.
+The core balances its sums when a run ends; only where it finds them open, or has left works out, the ledger
+is made.
 """
 
 from __future__ import annotations

@@ -17,8 +17,6 @@ The file is an .npz archive without pickled objects. Of s segments, e events, an
     level{l}_moving, _strain_*     kinetic energy 1/2 |moving xi'|^2, and the terms of a StrainForm
 
 It has n numbers for each mode of each visited level.
-
-Saved arrays: levels, segments and events of a saved run as plain arrays, and back (saved.py lists them).
 """
 
 from __future__ import annotations

@@ -1,13 +1,12 @@
 """Simulation: exact modal motion from event to event (eqs. 38.3, 38.6). There is no time step.
 
-The core advances the start from event to event. The result is a Trajectory of analytic segments. A failure
-ends the trajectory early, with a status and its cause.
+The core advances the start from event to event. The result is a Trajectory of analytic segments. A failure ends the
+trajectory early, with a status and its cause.
 
-Refinement: interpolation of smooth load courses that is fine enough for their tolerance of the response.
-
-An error dp of a modal force changes z = (omega eta, eta') by no more than the integral of |dp|, in every level. The
-error of the interpolated courses, times |P| and the length of the run, is compared with the largest |z|. The bound does
-not include the sensitivity to events, which separates any two motions that differ.
+Smooth courses of loads are interpolated finely enough for their tolerance of the response: an error dp of a modal force
+changes z = (omega eta, eta') by no more than the integral of |dp|, in every level. The error of the interpolated
+courses, times |P| and the length of the run, is compared with the largest |z|. The bound does not include the
+sensitivity to events, which separates any two motions that differ.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
-"""Model histories: points, contacts and frictions of a model by their names, as rows of its levels.
+"""Trajectory: the result of a simulation, analytic segments that are evaluated at any time (eq. 38.4).
 
-Trajectory: the result of a simulation, analytic segments that are evaluated at any time (eq. 38.4).
-
-Its histories are those of histories.py. Energies come from two independent sides: the ledger adds the losses (impacts,
-truncation, damping, the last in closed form) and the work of loads; its residual is the difference to
-kinetic + strain energy.
+Its histories are those of histories.py; points, contacts and frictions are rows of the model's levels by their names.
+Energies come from two independent sides: the ledger adds the losses (impacts, truncation, damping, the last in closed
+form) and the work of loads; its residual is the difference to kinetic + strain energy.
 """
 
 from __future__ import annotations

@@ -13,21 +13,18 @@ both differ by less than the tolerance / SAFETY, in |y| and at every point of th
 times as many: which contact strikes first may hang on a mode that both of two runs lack. Where the largest number of
 modes is reached before, the difference to half of it is told.
 
-Defects: the part of the motion at a transition that the modes of the new level do not contain.
-
-Inside a level every kept mode moves as it would among all modes, so truncation errors arise only where a level is
-entered and where a rigid contact is struck. There the state before, y and v, is known in all modes of the base, and so
-is the state after it with all modes: P removes the motion that closed rigid contacts prevent, Q also the motion that an
-impact has stopped. The difference to the truncated state after it is the defect
+A defect is the part of the motion at a transition that the modes of the new level do not contain. Inside a level every
+kept mode moves as it would among all modes, so truncation errors arise only where a level is entered and where a rigid
+contact is struck. There the state before, y and v, is known in all modes of the base, and so is the state after it with
+all modes: P removes the motion that closed rigid contacts prevent, Q also the motion that an impact has stopped. The
+difference to the truncated state after it is the defect
 
     d = P (y - Psi eta - y_inf),   w = Q (v - Psi eta'),   |defect|^2 = |d|^2 + |w / Omega|^2
 
 in the displacement norm of the mass matrix: w / Omega is the displacement that a lost velocity would have become in the
 open level, to which it comes back. At the start it is the static residual of the starting configuration. From level to
-level d and w / Omega are linear in the state before and in the changes beside the map of the levels
-(transitions/defect_forms.py); the triangular factors of these maps are kept, a few numbers per pair of levels.
-
-Truncation warnings: sentences on energy and motion lost to truncation, from the estimate of a run.
+level d and w / Omega are linear in the state before and in the changes beside the map of the levels (defect_forms.py);
+the triangular factors of these maps are kept, a few numbers per pair of levels.
 """
 
 from __future__ import annotations
