@@ -108,6 +108,18 @@ class TestTruncation:
         assert float(told.split(", and ")[1].split(" %")[0]) == pytest.approx(100 * lost / few.ledger.initial, rel=0.1)
         assert many.warnings == ()
 
+    @pytest.mark.parametrize("loads", [(), (mp.ConstantLoad("m9", 2.0),)], ids=["free", "static"])
+    def test_energy_that_displacements_hardly_show_is_said_alone(self, loads):
+        structure = chain(40, mass=0.5, stiffness=2e4, damping=mp.ModalDamping(0.02))
+        model = mp.MultiPhiModel(structure, [stop("m39", 5e-3, 2e4)], modes=37)
+        x, v = 1e-3 * np.arange(40.0), 0.03 * (-1.0) ** np.arange(40)  # that shape is in no mode of the 37
+        run = mp.simulate(model, 0.5, displacement=x, velocity=v, loads=loads)
+        (told,) = run.warnings
+        lost = run.ledger.truncation_kinetic + run.ledger.truncation_strain
+        share = 100 * lost / np.max(run.energy(np.linspace(0, 0.5, 1001)))
+        assert told.startswith("lost energy: truncation took ")
+        assert float(told.split("took ")[1].split(" %")[0]) == pytest.approx(share, rel=0.1)
+
     def test_a_start_that_the_modes_do_not_hold_is_said(self):
         run = mp.simulate(mp.MultiPhiModel(chain(40), modes=2), 1.0, displacement=np.eye(40)[20])
         assert kinds(run) == ["truncation"]
