@@ -2,7 +2,7 @@
 The method: levels, transitions, the law of events, and runs from event to event.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 import enum
 from typing import Annotated
 
@@ -46,7 +46,9 @@ class Kind(enum.Enum):
 
     viscous = 2
 
-    sliding = 3
+    bounded = 3
+
+    sliding = 4
 
 class Rule(enum.Enum):
     """

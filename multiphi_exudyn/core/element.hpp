@@ -22,6 +22,7 @@ enum class Kind {
     compliant,  // contact with a spring
     rigid,      // contact whose reaction is what it needs to be
     viscous,    // contact with a spring and a damper
+    bounded,    // contact with a spring and a damper whose force is at most that of the spring
     sliding,    // friction that is no part of a contact, or a force law with a held link
 };
 

@@ -76,6 +76,20 @@ double strain_energy(const State& state) {
     return total + form.constant;
 }
 
+namespace {
+
+// Energy [J] of the springs that act in a state of an element, at the gap of another state.
+double stored_by(const State& state, const Element& element, int acting) {
+    double total = 0.0;
+    for (const int link : element.states[acting].links) {
+        const double depth = gap(state, link);
+        total += 0.5 * state.level->model().base.stiffnesses[link] * depth * depth;
+    }
+    return total;
+}
+
+}  // namespace
+
 void add_losses(const State& before, const Key& key_before, const State& after, double collided, Loss& loss) {
     const Model& model = before.level->model();
     double relaxed = 0.0, dropped = 0.0;
@@ -87,6 +101,8 @@ void add_losses(const State& before, const Key& key_before, const State& after, 
             const double depth = gap(before, i), stored = 0.5 * element.stiffness * depth * depth;
             relaxed += is_open ? stored : -stored;
         }
+        if (element.kind == Kind::bounded && !was_open && !is_open)
+            relaxed += stored_by(before, element, left) - stored_by(before, element, entered);
         if (element.has_stick() && left == element.stick.state && entered != element.stick.state) {
             const double stretch = gap(before, element.stick.link);
             dropped += 0.5 * element.stick.spring * stretch * stretch * element.stick.drop;

@@ -23,7 +23,8 @@ double strain_energy(const State& state);     // no difference of large energies
 // states of the elements before, which at a start are not those of the level.
 //
 // A viscous contact that opens inside its stop loses the energy of its spring, and one that closes there regains it. A
-// spring that begins to slip loses the difference of its energies before and after the drop from its static limit.
+// bounded damper loses or regains that of the springs which cease or begin to act inside the stop. A spring that begins
+// to slip loses the difference of its energies before and after the drop from its static limit.
 void add_losses(const State& before, const Key& key_before, const State& after, double collided, Loss& loss);
 
 }  // namespace multiphi

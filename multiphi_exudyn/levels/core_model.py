@@ -92,6 +92,8 @@ def _kind(element: Element) -> core.Kind:
         return core.Kind.sliding
     if element.rigid:
         return core.Kind.rigid
+    if isinstance(element, UnilateralContact) and element.bounded:
+        return core.Kind.bounded
     return core.Kind.viscous if element.damping > 0 else core.Kind.compliant
 
 

@@ -5,11 +5,22 @@
     rigid      0 <= lambda, g >= 0, lambda g = 0, and g'+ >= -e g'- in an impact with g'- < 0  (Moreau)
     compliant  lambda = k max(0, -g)
     viscous    lambda = max(0, k (-g) + c (-g')) where g < 0, else 0
+    bounded    lambda = f_c + f_d, f_c = k (-g), f_d = c (-g') but |f_d| <= f_c, where g < 0, else 0
 
 A viscous contact closes when its gap falls through zero, and opens when its force falls to zero, which is before the
 gap returns to zero: it never pulls. Within the stop it closes again when k (-g) + c (-g') rises through zero. The
 damping work includes the strain energy k g^2 / 2 that is left when the contact opens within the stop (the damper
 dissipates it while the spring relaxes), less the strain energy when it closes again there.
+
+A bounded damper (Modelica's ElastoGap and Backlash) makes the force continuous: it rises from zero at the stop, and
+falls to zero there. The contact has three states in the stop, each of them linear:
+
+    compressed   c (-g') >= f_c           lambda = 2 k (-g)
+    closed       |c g'| <= f_c            lambda = k (-g) + c (-g')
+    released     c g' >= f_c              lambda = 0
+
+It closes compressed, and opens at g = 0. `energy` counts the spring 2 k while it is compressed, and none while it is
+released; what changes with the state is damping work.
 
 Friction. For a closed contact that can slide along h_t, with the force N = lambda,
 
@@ -33,6 +44,7 @@ which sliding has no unique motion is refused with its number (levels/level/slid
     viscous           possible                     refused: the end of slip depends on   refused, as without friction
                                                    N', which contains an acceleration
     rigid             possible                     refused: so does N' of a reaction     possible, by Poisson's law
+    bounded           refused                      refused                               refused, as without friction
     force law         impossible: a law is not a contact, and has no N
 
 The possible combinations hold for runs, steady states, frequency responses, static equilibria, and the Exudyn body,
@@ -70,6 +82,8 @@ from multiphi_exudyn.mechanics.structure import At
 
 __all__ = ["UnilateralContact"]
 
+DAMPERS = ("linear", "bounded")
+
 
 @dataclass(frozen=True, eq=False)
 class UnilateralContact:
@@ -80,6 +94,7 @@ class UnilateralContact:
         rigid      lambda >= 0, g >= 0, lambda g = 0;  impact g'+ >= -e g'-  (Moreau)
         compliant  lambda = k max(0, -g)
         viscous    lambda = max(0, k (-g) + c (-g')) where g < 0, else 0
+        bounded    lambda = f_c + f_d, f_c = k (-g), f_d = c (-g') but |f_d| <= f_c, where g < 0, else 0
 
         stick      T = k_t (h_t.x - v_t t - w), or the reaction;  |T| <= mu_s N
         slip       T = s mu N,  N = lambda,  s (h_t.x' - v_t - T' / k_t) >= 0,  s = 1 or -1
@@ -113,14 +128,17 @@ class UnilateralContact:
         e of a rigid contact, 0 to 1. Coupled contacts with a common impact need the same e.
     tangential_velocity : float, default 0.0
         v_t [m/s] of the counter-surface along +h_t.
+    damper : {"linear", "bounded"}, default "linear"
+        Whether the damper's force is at most the spring's, as Modelica's ElastoGap has it; then without friction.
 
     Raises
     ------
     MultiPhiTypeError
         For a name that is not a string, and values that are not numbers.
     MultiPhiValueError
-        For numbers out of these ranges; damping of a rigid contact, restitution of a compliant one, friction without a
-        tangential direction, and a tangential spring of a rigid or a viscous contact.
+        For values out of these ranges; damping of a rigid contact, a bounded damper without damping or with friction,
+        restitution of a compliant contact, friction without a tangential direction, and a tangential spring of a rigid
+        or a viscous contact.
 
     Examples
     --------
@@ -149,6 +167,7 @@ class UnilateralContact:
     tangential_stiffness: float = math.inf
     restitution: float = 0.0
     tangential_velocity: float = 0.0
+    damper: str = "linear"
     velocity: ClassVar[float] = 0.0
     held: ClassVar[bool] = False
 
@@ -173,7 +192,16 @@ class UnilateralContact:
         if self.restitution and not self.rigid:
             needed = "need stiffness=inf (the loss of a compliant contact is its damping)"
             raise self._refused("restitution", needed, " beside a finite stiffness")
+        self._check_damper()
         self._check_friction()
+
+    def _check_damper(self) -> None:
+        if self.damper not in DAMPERS:
+            raise self._refused("damper", f"need one of: {', '.join(DAMPERS)}")
+        if self.bounded and not self.damping:
+            raise self._refused("damper", "need a damping > 0", " beside the damping 0.0")
+        if self.bounded and (self.friction or self.static_friction):
+            raise self._refused("damper", "need 'linear', or no friction", " beside friction")
 
     def _check_friction(self) -> None:
         if not (math.isfinite(self.friction) and self.friction >= 0):
@@ -204,6 +232,11 @@ class UnilateralContact:
         return math.isinf(self.stiffness)
 
     @property
+    def bounded(self) -> bool:
+        """True for a damper whose force is at most that of the spring."""
+        return self.damper == "bounded"
+
+    @property
     def most(self) -> float:
         """mu_s, limit of stick."""
         return self.friction if self.static_friction is None else self.static_friction
@@ -215,7 +248,12 @@ class UnilateralContact:
 
     @functools.cached_property
     def further(self) -> tuple[Link, ...]:
-        """With friction: the tangential link, and two normal links with the friction of slip in either direction."""
+        """With friction: the tangential link, and two normal links with the friction of slip in either direction.
+
+        With a bounded damper: the spring 2 k in place of spring and damper.
+        """
+        if self.bounded:
+            return (Link(f"{self.name}.compressed", self.direction, self.gap, 2 * self.stiffness),)
         if self.tangential is None or not self.most:
             return ()
         along, normal = (self.direction, self.gap, self.stiffness, self.damping), (1.0, self.direction)
@@ -236,7 +274,12 @@ class UnilateralContact:
 
     @functools.cached_property
     def states(self) -> tuple[ElementState, ...]:
-        """States open and closed; with friction, open, stick, slip+, slip-, and for a compliant contact idle."""
+        """States open and closed; with friction, open, stick, slip+, slip-, and for a compliant contact idle.
+
+        With a bounded damper: open, closed, compressed, released.
+        """
+        if self.bounded:
+            return self._bounded_states()
         plain = contact_states(self.rigid, self.damping > 0)
         if not self.further:
             return plain
@@ -253,6 +296,20 @@ class UnilateralContact:
             self._slip("+", 1.0, 2, opening),
             self._slip("-", -1.0, 3, opening),
             *(() if self.rigid or turn is None else (self._idle(opening),)),
+        )
+
+    def _bounded_states(self) -> tuple[ElementState, ...]:
+        """Signals q, and f_c - f_d = -k q + c q' and f_c + f_d = -k q - c q' of the forces in the stop, q = g."""
+        k, c, opens = self.stiffness, self.damping, Exit("open", gap=-1.0)
+        exceeds, pulls = Exit("compressed", gap=-k, rate=c), Exit("released", gap=-k, rate=-c)
+        yields, presses = Exit("closed", gap=k, rate=-c), Exit("closed", gap=k, rate=c)
+        at_bounds = (replace(each, firmness=TAKEN_ONCE) for each in (exceeds, pulls, yields, presses))
+        exceeds, pulls, yields, presses = at_bounds
+        return (
+            ElementState("open", "open", (Exit("compressed", gap=1.0),)),
+            ElementState("closed", "segment", (exceeds, pulls, opens), holds=(0,)),
+            ElementState("compressed", "segment", (yields, opens), holds=(1,)),
+            ElementState("released", "segment", (presses, opens)),
         )
 
     def _idle(self, opening: Exit) -> ElementState:
@@ -277,6 +334,12 @@ class UnilateralContact:
         A rigid contact starts open, and closes at once if it is pressed; a viscous one never pulls. rates: of the
         further links; without a spring the contact sticks only without velocity relative to its counter-surface.
         """
+        if self.bounded:
+            if gap >= 0:
+                return "open"
+            if self.damping * abs(rate) <= -self.stiffness * gap:
+                return "closed"
+            return "compressed" if rate < 0 else "released"
         pulls = self.damping > 0 and self.stiffness * gap + self.damping * rate > 0
         if gap >= 0 or self.rigid or pulls:
             return "open"

@@ -102,11 +102,11 @@ class ElementTable:
 
     @functools.cached_property
     def labels(self) -> tuple[str, ...]:
-        """Names of all links (l,); those of their elements for links of force laws and of sliding contacts."""
+        """Names of all links (l,); those of their elements for links that press."""
         named = list(range(len(self.links)))
         for element, indices in enumerate(self.link_indices):
             for link in indices:
-                if element in self.laws or link in self.oblique:
+                if element in self.laws or not self.links[link].held:
                     named[link] = element
         return tuple(self.links[k].name for k in named)
 
@@ -118,7 +118,7 @@ class ElementTable:
         first, *further = self.link_indices[element]
         if element in self.laws:
             return further
-        return [first, *(k for k in further if k in self.oblique)]
+        return [first, *(k for k in further if not self.links[k].held)]
 
     def links_named(self, closed: Iterable[str]) -> tuple[int, ...]:
         """Indices of the links that act with these contacts closed, all others open, and laws in segment "0"."""

@@ -223,8 +223,10 @@ def _contacts(run: JudgedRun, inside: Inside) -> list[str]:
             found += _told(f"force of {name} across its gap", np.where(pressed, np.abs(gap), 0.0), length, times)
             found += _told(f"force of {name} as it opens or closes", np.where(pressed, np.abs(rate), 0.0), speed, times)
             continue
-        law = np.where(gap < 0, np.maximum(0.0, -contact.stiffness * gap - contact.damping * rate), 0.0)
-        touching = np.abs(gap) <= length  # a damper's force jumps there
+        spring, damper = -contact.stiffness * gap, -contact.damping * rate
+        bounded = np.clip(damper, -np.abs(spring), np.abs(spring)) if contact.bounded else damper
+        law = np.where(gap < 0, np.maximum(0.0, spring + bounded), 0.0)
+        touching = np.abs(gap) <= length  # a damper's force jumps there, unless it is bounded
         off = np.where(touching & (contact.damping > 0), 0.0, np.abs(N - law))
         found += _told(f"law of {name}", off, force + contact.stiffness * length, times)
     return found
@@ -562,8 +564,11 @@ def _energy(run: JudgedRun, trajectory: Trajectory, t: float) -> tuple[float, fl
     for contact in run.contacts:
         gap = float(run.rows[contact.name] @ x) + contact.gap - float(run.stop(contact, np.array([t]))[0][0])
         stored = 0.0 if contact.rigid else 0.5 * contact.stiffness * min(0.0, gap) ** 2
-        if contact.damping and float(trajectory.contact_force(contact.name, t)) <= EXACT * contact.stiffness * abs(gap):
+        force, spring = float(trajectory.contact_force(contact.name, t)), contact.stiffness * abs(gap)
+        if contact.damping and force <= EXACT * spring:
             either += stored
+        elif contact.bounded and force >= 2 * (1 - EXACT) * spring:
+            energy += 2 * stored  # of the spring 2 k that stands for spring and damper
         else:
             energy += stored
     springs = [(friction.name, friction.stiffness) for friction in run.frictions]

@@ -28,6 +28,7 @@ LIGHT = dict.fromkeys(KINDS, 3) | {
     "assembled": 7,
     "clamps": 0,
     "restarts": 10,
+    "bounded": 4,
     "truncated": 0,
     "friction": 2,
     "friction blocks": 5,

@@ -22,6 +22,7 @@ LOOSE = mp.LinearStructure(
 CASES = {
     "compliant": (STRUCTURE, [mp.UnilateralContact("stop", "m2", 0.1, 50.0)], -1.0, "m1"),
     "viscous": (STRUCTURE, [mp.UnilateralContact("stop", "m2", 0.1, 50.0, damping=0.5)], -1.0, "m1"),
+    "bounded": (STRUCTURE, [mp.UnilateralContact("stop", "m2", 0.1, 50.0, 0.5, damper="bounded")], -1.0, "m1"),
     "rigid": (STRUCTURE, [mp.UnilateralContact("stop", "m2", 0.1)], -1.0, "m1"),
     "rigid, on what it holds": (STRUCTURE, [mp.UnilateralContact("stop", "m2", 0.1)], -1.0, "m2"),
     "two rigid": (

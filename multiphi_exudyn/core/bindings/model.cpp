@@ -82,6 +82,7 @@ void bind_elements(nb::module_& module) {
         .value("compliant", Kind::compliant)
         .value("rigid", Kind::rigid)
         .value("viscous", Kind::viscous)
+        .value("bounded", Kind::bounded)
         .value("sliding", Kind::sliding);
     nb::enum_<Rule>(module, "Rule", "What happens to a guard whose signal is negative after changes of others.")
         .value("may_recover", Rule::may_recover)

@@ -35,17 +35,18 @@ def equilibrium_under_forces(
 
     size: (m,) sum of the absolute values of the terms of the load.
     """
+    follows_path = base.laws or base.general or len(base.links) > len(base.contacts)  # states beside open and closed
     if base.modes.rigid:
-        if base.laws or base.general:
+        if follows_path:
             raise MultiPhiValueError(
-                f"static equilibrium: the structure is free ({base.modes.rigid} rigid-body modes) and has force laws "
-                "or friction, need supports that hold it"
+                f"static equilibrium: the structure is free ({base.modes.rigid} rigid-body modes) and has force "
+                "laws, friction or bounded dampers, need supports that hold it"
             )
         unbalanced = _unbalanced(base, load, size)
         if unbalanced > BALANCED and not inertia_relief:
             return equilibrium_on_contacts(base, load, unbalanced), np.zeros(len(base.contacts))
         return _free_deformation(base, load), np.zeros(len(base.contacts))
-    if base.laws or base.general:
+    if follows_path:
         return equilibrium_along_path(base, load)
     compliance = base.modes.omega**-2.0
     gaps = base.directions.T @ (compliance * load) + base.gaps

@@ -34,7 +34,8 @@ import numpy as np
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.equilibrium.sliding_equilibrium import static_response_with_friction
-from multiphi_exudyn.mechanics.element import ElementState, Exit
+from multiphi_exudyn.mechanics.contact import UnilateralContact
+from multiphi_exudyn.mechanics.element import Element, ElementState, Exit, contact_states
 
 __all__ = ["Equilibrium", "equilibrium_along_path"]
 
@@ -100,7 +101,7 @@ class _ElementStates:
 
     def of(self, base: ModalBase, element: int) -> ElementState:
         """Return the state of an element."""
-        return base.contacts[element].states[self.states[element]]
+        return _states_at_rest(base.contacts[element])[self.states[element]]
 
     def closed(self, base: ModalBase) -> list[int]:
         """Return the active links."""
@@ -175,6 +176,12 @@ def equilibrium_along_path(base: ModalBase, load: np.ndarray) -> tuple[np.ndarra
     )
 
 
+def _states_at_rest(element: Element) -> tuple[ElementState, ...]:
+    """Return the states of an element where nothing moves: there a bounded damper has no force, and no bounds."""
+    is_bounded = isinstance(element, UnilateralContact) and element.bounded
+    return contact_states(rigid=False, viscous=False) if is_bounded else element.states
+
+
 def _first_state(base: ModalBase, element: int) -> int:
     """Return the index of an element's state in the undeformed structure."""
     contact, rates = base.contacts[element], [0.0] * len(base.link_indices[element])
@@ -191,7 +198,7 @@ def _next_change(base: ModalBase, elements: _ElementStates, path: _Path, s: floa
             if decrease > SLACK * size:
                 at = s + max(float(path.at(s, ends)), 0.0) / decrease
                 if at < (1.0 if change is None else change[0]):
-                    change = at, i, [state.name for state in element.states].index(exit_.asked)
+                    change = at, i, [state.name for state in _states_at_rest(element)].index(exit_.asked)
     return change
 
 
@@ -239,7 +246,7 @@ def _sliding_force(base: ModalBase, element: int, state: ElementState, path: _Pa
 
 def _alternatives(base: ModalBase, elements: _ElementStates, element: int, new_state: int) -> list[int]:
     """Return the states that an element may enter, that of its exit first: a contact that closes may slide at once."""
-    states = base.contacts[element].states
+    states = _states_at_rest(base.contacts[element])
     if elements.of(base, element).name != "open":
         return [new_state]
     return [new_state, *(k for k, state in enumerate(states) if state.name != "open" and k != new_state)]

@@ -96,6 +96,16 @@ def _viscous(random):
     return parts.scene(velocity=random_velocity(parts))
 
 
+def _bounded(random):
+    """Viscous contacts whose dampers are bounded; brute force has none, so the law is what judges."""
+    parts = random_parts(random, damping=str(random.choice(["none", "rayleigh", "modal"])))
+    add_contacts(parts, "viscous", gap=(0.0, 0.2))
+    parts.contacts = [replace(contact, damper="bounded") for contact in parts.contacts]
+    if random.random() < 0.5:
+        random.choice([add_harmonic_load, add_constant_load])(parts)
+    return replace(parts.scene(velocity=random_velocity(parts)), system=None)
+
+
 def _table(random, soft):
     """Knots and forces of a law: centre inside, at an end, or nowhere; one-sided; slopes of either sign."""
     kind = str(random.choice(["inner", "inner", "end", "no zero", "one-sided", "softening"]))
@@ -362,6 +372,7 @@ DRAWN = {
     "clamps": _clamps,
     "units": _units,
     "restarts": _restarts,
+    "bounded": _bounded,
 }
 if "restitution" in {f.name for f in fields(mp.UnilateralContact)}:
     DRAWN["restitution"] = _restitution
