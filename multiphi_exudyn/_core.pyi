@@ -841,6 +841,8 @@ class Run:
     def reached(self) -> StepState:
         """the state right before the last decision, or that at the end"""
 
+    def limit_record(self, bytes: int) -> None: ...
+
     @property
     def defects(self) -> float:
         """their sum so far, which may begin anew"""

@@ -13,7 +13,6 @@ namespace multiphi {
 namespace {
 
 constexpr double accumulated = 1e-6;           // of the time so far: a window of decisions within it is chatter
-constexpr std::size_t most_bytes = 1ull << 31;  // of a record: ten million segments of a small model
 constexpr std::size_t most_level_bytes = 1ull << 29, between_checks = 256;  // of the levels; segments between checks
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
@@ -54,11 +53,12 @@ Run::Run(std::shared_ptr<Levels> levels, Chatter chatter, double time)
     : levels_(std::move(levels)),
       trajectory_(std::make_shared<Trajectory>()),
       inputs_(levels_->excitation()),
-      law_(*levels_, inputs_),
+      law_(*levels_, inputs_, chatter_.exchanges),
       chatter_(std::move(chatter)),
       defects_(*levels_),
       time_(time) {
     chatter_.begin(time);
+    chatter_.exchanges.begin(levels_->model().size());
     trajectory_->instants.push_back(time);
 }
 
@@ -78,9 +78,22 @@ void Run::go_on_from(const FinalState& state, bool loads_differ) {
     current_.all_armed =
         std::all_of(state.phases.begin(), state.phases.end(), [](Phase phase) { return phase == Phase::armed; });
     measure(current_, inputs_);
+    hold_again();
     has_started_ = !loads_differ;
     goes_on_ = true;
     defects_.sum = loads_differ ? 0.0 : nan;
+}
+
+// Contacts that another run has held open are held for a period.
+void Run::hold_again() {
+    const Level& level = *current_.level;
+    if (!(level.highest_frequency() > 0.0)) return;
+    for (std::size_t k = 0; k < current_.phases.size(); ++k) {
+        const int element = level.guards()[k].element;
+        if (current_.phases[k] == Phase::held_back && levels_->model().elements[element].is_rigid() &&
+            level.state(element) == open_state)
+            chatter_.exchanges.hold(element, time_ + 1.0 / level.highest_frequency());
+    }
 }
 
 void Run::begin_step(double time, const StepState& state) {
@@ -167,10 +180,10 @@ Run::Ending Run::run_segments(double end, bool stop_at_event) {
         const std::size_t events_before = trajectory_->events.size();
         if (inputs_.count() > 0 && time_ >= inputs_.interval_end()) begin_next_interval(end);
         advance_segment(inputs_.count() > 0 ? std::min(end, inputs_.interval_end()) : end);
-        if (trajectory_->bytes() > most_bytes)
+        if (trajectory_->bytes() > most_bytes_)
             throw NumericalFailure(Cause::record_full, {},
                                    {static_cast<double>(trajectory_->bytes()),
-                                    static_cast<double>(trajectory_->segments.size()), static_cast<double>(most_bytes)});
+                                    static_cast<double>(trajectory_->segments.size()), static_cast<double>(most_bytes_)});
         bound_levels();
         if (stop_at_event && trajectory_->events.size() > events_before) return Ending::event;
     }
@@ -258,10 +271,12 @@ void Run::begin_next_interval(double end) {
     keep_events();
 }
 
-// Advances within one level to the next decision, or to `end` [s]. Guards are armed on the way: the state reached has their
+// Advances within one level to the next decision, to where a contact is no more held open, or to `end` [s]. Guards are armed on the way: the state reached has their
 // phases, and becomes the state of the instant.
 void Run::advance_segment(double end) {
     const Level& level = *current_.level;
+    law_.instant.time = time_;
+    end = std::min(end, law_.next_release());
     const double start_time = time_, horizon = end - start_time;
     const State& start = current_;
     State& reached = law_.instant.reached;
@@ -304,6 +319,7 @@ void Run::advance_segment(double end) {
     const double fastest = motion_.basis().fastest;
     const bool is_at_once = elapsed <= (fastest > 0.0 ? instant / fastest : 0.0);
     if (is_at_once) keep_scales(reached, start);
+    if (!is_decision_due) is_decision_due = law_.release_held(start_time);
     if (keeps_summary_)
         motion_size_.sample(motion_, start_time, instant_time, defects_.sum, chatter_.last_decision(),
                             levels_->excitation().is_isolated);

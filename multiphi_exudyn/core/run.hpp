@@ -29,6 +29,8 @@ class Chatter {
     bool is_chatter(double time, double& elapsed, double& highest_frequency) const;
     double last_decision() const { return last_decision_; }
 
+    Exchanges exchanges;
+
   private:
     struct Decision {
         double time_before = 0.0, highest_frequency = 0.0;
@@ -81,6 +83,8 @@ class Run {
     void sum_works(bool sums) { sums_works_ = sums; }
     // Other runs use the levels at the same time, so that none is forgotten.
     void share_levels() { shares_levels_ = true; }
+    // The largest record [bytes]; a run that needs more ends.
+    void limit_record(std::size_t bytes) { most_bytes_ = bytes; }
     // Whether energies at the end and the truncation estimate are wanted.
     void keep_summary(bool keeps) { keeps_summary_ = keeps; }
 
@@ -88,6 +92,7 @@ class Run {
     Ending run_segments(double end, bool stop_at_event);
     void begin_run();
     void continue_run();
+    void hold_again();
     void begin_next_interval(double end);
     void advance_segment(double end);
     void keep_segment(double instant_time, double age, double armed_after, double horizon, bool is_summed);
@@ -116,6 +121,7 @@ class Run {
     std::vector<Term> terms_before_;  // of the channels at its start
     bool has_started_ = false, goes_on_ = false;
     bool sums_works_ = true, keeps_summary_ = true, shares_levels_ = false;
+    std::size_t most_bytes_ = 1ull << 31;  // ten million segments of a small model
     std::size_t segments_checked_ = 0;  // when the memory of the levels was last looked at
 };
 

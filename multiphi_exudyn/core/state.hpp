@@ -17,7 +17,7 @@ enum class Phase : unsigned char {
     armed,       // its signal is not negative
     recovering,  // negative by truncation, and rising
     refused,     // it may not make the change that it requests
-    held_back,   // refused, and would repeat its request at the same instant without end
+    held_back,   // refused, and would repeat its request at the same instant without end; or held open (law/exchanges.hpp)
     landing,     // of a rigid contact on its last bounce: at its end it stays closed
 };
 

@@ -114,18 +114,28 @@ def ledger_of(
     )
 
 
+class Counts(NamedTuple):
+    """Work of a run so far, a copy: later runs in the same levels do not change it. Bytes: see Statistics."""
+
+    levels_built: int
+    transitions: int
+    function_evaluations: int
+    record_bytes: int
+    array_bytes: int
+
+
 @dataclass(frozen=True)
 class FinalState:
     """State and sums of a run.
 
     record: its segments and events. state: the last one, None before the first one. ledger: of the core.
-    levels_built: of the model.
+    counts: of its work.
     """
 
     record: Record
     state: State | None
     ledger: core.Ledger
-    levels_built: int = 0
+    counts: Counts
 
     @property
     def level(self) -> LoadedLevel | None:
@@ -162,13 +172,4 @@ class FinalState:
 
     def statistics(self, segments: int, events: int, possible: int) -> Statistics:
         """Work of the run; possible: number of possible levels."""
-        return Statistics(
-            levels_built=self.levels_built,
-            levels_possible=possible,
-            transitions=self.record.trajectory.transitions,
-            events=events,
-            segments=segments,
-            function_evaluations=self.record.trajectory.evaluations,
-            record_bytes=self.record.trajectory.memory,
-            array_bytes=self.record.core_levels.bytes,
-        )
+        return Statistics(levels_possible=possible, events=events, segments=segments, **self.counts._asdict())

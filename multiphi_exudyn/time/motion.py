@@ -20,7 +20,7 @@ from multiphi_exudyn.events.transitions.state import Loss, State
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.time.core_levels import core_levels
-from multiphi_exudyn.time.ledger import NUMBERS, FinalState
+from multiphi_exudyn.time.ledger import NUMBERS, Counts, FinalState
 from multiphi_exudyn.time.record import PHASES, Events, Record
 from multiphi_exudyn.time.start import Start
 from multiphi_exudyn.time.trajectory import Rerun, Trajectory
@@ -135,8 +135,9 @@ class Motion:
         self.time = self._run.time
 
     def _final(self) -> FinalState:
-        ledger = copy.copy(self._run.trajectory.ledger)
-        return FinalState(self.record, self._state(), ledger, self.model.levels_built)
+        kept = self._run.trajectory
+        counts = Counts(self.model.levels_built, kept.transitions, kept.evaluations, kept.memory, self._levels.bytes)
+        return FinalState(self.record, self._state(), copy.copy(kept.ledger), counts)
 
     def trajectory(self, end: float, again: Rerun | None = None) -> Trajectory:
         """Trajectory of the segments and events so far; again: see Trajectory."""
@@ -189,8 +190,9 @@ def failure(model: MultiPhiModel, told: core.Failure, states: Sequence[int]) -> 
         f"{facts[0] / (2 * math.pi):g} Hz, whose samples every {facts[1]:g} s until the end, in {facts[2]:g} s, would "
         "take too long; need fewer modes or a shorter run",
         core.Cause.chatter: f"chatter: {window} events in {facts[0]:g} s, more than {limit} in a period of the "
-        f"highest kept mode or load ({facts[1]:g} Hz), or all within {ACCUMULATED:g} of the time so far; more modes or "
-        "contacts of finite stiffness may help",
+        f"highest kept mode or load ({facts[1]:g} Hz), or all within {ACCUMULATED:g} of the time so far; need "
+        + ("" if complete else 'MultiPhiModel(..., boundary="residual"), which has no impacts, or ')
+        + "contacts of finite stiffness",
         core.Cause.not_admissible: f"contacts {names}: no set of closed contacts is admissible at this instant",
         core.Cause.squeezed: f"rigid contacts {names}: their stops move against each other and leave no way out"
         + ("" if complete else " in the kept modes, need more of them"),

@@ -15,7 +15,7 @@ from multiphi_exudyn import (
     UnilateralContact,
     simulate,
 )
-from multiphi_exudyn.study.stability.law_check import broken_laws
+from multiphi_exudyn.study.law_check import broken_laws
 
 
 def test_samples_of_a_load_are_no_events():
@@ -67,6 +67,39 @@ def test_a_truncated_pipe_comes_to_rest_on_its_racks(number):
     assert run.status == "ok", run.message
     assert not broken
     assert len(run.events) < 5000
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_a_bar_falls_flat_on_a_bed_of_stops(number):
+    """Contacts that exchange their states faster than the modes can follow are held open for a period."""
+    run, broken = run_of("landings", number)
+    assert run.status == "ok", run.message
+    assert not broken
+
+
+def closings_in_a_period(run):
+    """The largest number of closings of one contact within a period of the fastest mode."""
+    period, most = 1 / run.model.highest_frequency, 0
+    for name in run.contacts:
+        times = np.unique([event.time for event in run.events if event.contact == name and event.kind == "close"])
+        counts = np.searchsorted(times, times + period) - np.arange(len(times))
+        most = max(most, int(np.max(counts, initial=0)))
+    return most
+
+
+def test_no_contact_closes_more_often_than_the_modes_can_follow():
+    run, _ = run_of("landings", 2)
+    assert 1 < closings_in_a_period(run) <= 8
+
+
+@pytest.mark.parametrize(("kind", "number"), [("racks", 3), ("racks", 46), ("landings", 2)])
+def test_the_remedy_that_chatter_names_works(kind, number):
+    """On a residual boundary rigid contacts have no impacts."""
+    scene = scene_of(kind, number)
+    given = scene.model
+    model = MultiPhiModel(given.structure, given.contacts, modes=given.modes, boundary="residual")
+    run = simulate(model, scene.t_end, scene.displacement, scene.velocity, scene.loads)
+    assert run.status == "ok", run.message
 
 
 @pytest.mark.parametrize(("count", "gap"), [(12, 0.1), (16, 0.1), (17, 0.55), (20, 0.1), (24, 0.25), (32, 0.1)])

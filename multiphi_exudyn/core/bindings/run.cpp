@@ -287,6 +287,7 @@ void bind_run(nb::module_& module) {
         .def_prop_ro("present", [](const Run& run) { return run.step_state(run.current()); })
         .def_prop_ro("reached", [](const Run& run) { return run.step_state(run.reached()); },
                      "the state right before the last decision, or that at the end")
+        .def("limit_record", &Run::limit_record, "bytes"_a)
         .def_prop_rw("defects", [](Run& run) { return run.defects(); },
                      [](Run& run, double sum) { run.defects() = sum; }, "their sum so far, which may begin anew")
         .def_prop_rw("chatter", [](Run& run) { return Chatter(run.chatter()); },

@@ -16,8 +16,8 @@ constexpr int rounds = 20;       // decisions at one instant: with more the cont
 
 }  // namespace
 
-Law::Law(Levels& levels, const Inputs& inputs)
-    : levels_(&levels), model_(&levels.model()), inputs_(&inputs), impact_(levels.model()) {
+Law::Law(Levels& levels, const Inputs& inputs, Exchanges& exchanges)
+    : levels_(&levels), model_(&levels.model()), inputs_(&inputs), exchanges_(&exchanges), impact_(levels.model()) {
     const int count = model_->size();
     for (Requests* requests : {&instant.asked, &targets_, &pending_, &pulling_}) requests->assign(count, no_request);
     for (Flags* flags : {&instant.refused_before, &instant.treated, &instant.freed, &instant.begins_last_bounce,
@@ -51,6 +51,8 @@ void Law::decide() {
     if (static_cast<int>(instant.changes.size()) > instant.first_change)
         std::fill(instant.refused_before.begin(), instant.refused_before.end(), 0);
     mark_last_bounces();
+    count_closings();
+    hold_exchanging(instant.trial);
 }
 
 bool Law::decide_jump() {
@@ -192,7 +194,8 @@ void Law::apply_requests(Requests& requests) {
     for (int i = 0; i < count; ++i) {
         const Element& element = model_->elements[i];
         const int state = instant.trial.level->state(i), stick = element.stick.state;
-        striking_[i] = element.is_rigid() && state == open_state && (instant.treated[i] || is_inside(instant.trial, i));
+        striking_[i] = element.is_rigid() && state == open_state && !exchanges_->is_held(i, instant.time) &&
+                       (instant.treated[i] || is_inside(instant.trial, i));
         any_strikes = any_strikes || (striking_[i] && requests[i] != no_request);
         int requested = requests[i] == no_request ? state : requests[i];
         if (element.stick.spring > 0.0 && state == stick && requested > stick)

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "energy.hpp"
+#include "law/exchanges.hpp"
 #include "law/impact.hpp"
 #include "law/instant.hpp"
 #include "levels.hpp"
@@ -43,7 +44,8 @@ struct Watched {
 
 class Law {
   public:
-    Law(Levels& levels, const Inputs& inputs);
+    // exchanges: what the law remembers of earlier instants, kept by the run.
+    Law(Levels& levels, const Inputs& inputs, Exchanges& exchanges);
 
     Instant instant;  // the present one
 
@@ -128,12 +130,19 @@ class Law {
     // repeat its request at the same instant, alone or in turn with others, it is *held back* until s has risen to zero,
     // or until another contact requests a change at a later instant, or changes. An impact of contacts that come inside
     // their stops, after which all are as they were, does not take place, as it would be repeated without end: they close
-    // without it, or are refused.
+    // without it, or are refused. In truncated models a rigid contact without restitution that closes many times
+    // within a period of the fastest mode or load exchanges its state with others without end: what they do to each other so fast is no motion of
+    // these modes. It is held open for such a period, takes part in no impact meanwhile, and is then decided anew.
     void update_phases(State& state, const Flags* refused);
     void hold_back(State& state);
     void arm_return_guards();
+    void hold_exchanging(State& state);
+    void count_closings();
 
   public:
+    double next_release() const { return exchanges_->next_release(instant.time); }
+    // Decides which of the contacts held open until the instant request to close; `start`: of the segment.
+    bool release_held(double start);
     static void arm(State& reached, int guard);
     void flag_repeated_requests(bool at_once);
 
@@ -162,7 +171,7 @@ class Law {
     // -------------------------------------------------------------------------------------------------------------
     // 9. The sign of a signal is that of its first derivative, of order zero or higher, that is not round-off: of its
     // terms, of the earlier motion, or of the map that has made the state.            (state.hpp: signal_sign, rate_sign)
-    int becomes(const State& state, const Signal& signal, int since);
+    int first_derivative_sign(const State& state, const Signal& signal, int since);
 
     // -------------------------------------------------------------------------------------------------------------
     // 10. A contact with friction and a tangential spring sticks when it closes. Without a spring it slides in the
@@ -256,6 +265,7 @@ class Law {
     Levels* levels_;
     const Model* model_;
     const Inputs* inputs_;
+    Exchanges* exchanges_;
     Impact impact_;
     Mover mover_;
     Motion motion_;  // of a state under trial

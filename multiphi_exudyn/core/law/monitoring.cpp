@@ -18,6 +18,7 @@ void Law::watch(Motion& motion, const std::vector<Phase>& phases, SearchedSignal
     for (int k = 0; k < static_cast<int>(level.guards().size()); ++k) {
         const Guard& guard = level.guards()[k];
         if (immovable_[guard.element]) continue;
+        if (phases[k] == Phase::held_back && exchanges_->is_held(guard.element, instant.time)) continue;
         if (phases[k] == Phase::armed || phases[k] == Phase::landing) {
             wait_for(motion, guard.signal, 1.0, Of::signal, false, signals);
             watched.push_back({k, true});

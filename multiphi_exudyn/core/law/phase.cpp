@@ -1,4 +1,5 @@
 // Phases: what every guard of a state waits for (sentences 1, 5, 6, 9).
+#include <algorithm>
 #include <cmath>
 
 #include "law/law.hpp"
@@ -6,6 +7,8 @@
 
 namespace multiphi {
 
+// A guard is armed where its signal is above zero, or zero and not falling. A negative one recovers if it rises and its rule
+// lets it wait, else its request is refused.
 Phase Law::phase_of(const State& state, const Guard& guard) {
     double mapped = 0.0;
     if (guard.rule == Rule::always_taken || guard.rule == Rule::never_recovers)
@@ -13,14 +16,15 @@ Phase Law::phase_of(const State& state, const Guard& guard) {
     const int value = signal_sign(state, guard.signal, mapped);
     if (value > 0) return Phase::armed;
     int rate = rate_sign(state, guard.signal, *inputs_);
-    if (rate == 0) rate = becomes(state, guard.signal, 2);
+    if (rate == 0) rate = first_derivative_sign(state, guard.signal, 2);
     if (value == 0 && rate >= 0) return Phase::armed;
     const bool recovers =
         guard.rule == Rule::may_recover || guard.rule == Rule::taken_once || guard.rule == Rule::taken_falling;
     return rate > 0 && recovers ? Phase::recovering : Phase::refused;
 }
 
-int Law::becomes(const State& state, const Signal& signal, int since) {
+// The sign of a signal's first derivative, of an order from `since` on, that is not round-off of its terms on the motion.
+int Law::first_derivative_sign(const State& state, const Signal& signal, int since) {
     motion_.begin(state, *inputs_);
     coefficients_.resize(motion_.size());
     sizes_.resize(motion_.size());
@@ -32,6 +36,7 @@ int Law::becomes(const State& state, const Signal& signal, int since) {
     return first_sign(motion_.basis(), coefficients_.data(), sizes_.data(), constant, since);
 }
 
+// Sets the phases of a state that has been entered; `refused` flags elements whose requests were not granted.
 void Law::update_phases(State& state, const Flags* refused) {
     const std::vector<Guard>& guards = state.level->guards();
     state.phases.resize(guards.size());
@@ -43,6 +48,7 @@ void Law::update_phases(State& state, const Flags* refused) {
         state.all_armed = false;
         if (refused && (*refused)[guard.element]) state.phases[k] = Phase::refused;
     }
+    hold_exchanging(state);
 }
 
 bool Law::is_denied(const State& state, int element) const {
@@ -90,6 +96,48 @@ void Law::arm_return_guards() {
             signal_sign(trial, guard.signal) == 0)
             trial.phases[k] = Phase::armed;
     }
+}
+
+// Holds open the rigid contacts of a state that exchange their states too fast.
+void Law::hold_exchanging(State& state) {
+    for (int i = 0; i < model_->size(); ++i)
+        if (state.level->state(i) == open_state && exchanges_->is_held(i, instant.time)) {
+            state.phases[state.level->first_guard(i)] = Phase::held_back;
+            state.all_armed = false;
+        }
+}
+
+// Counts the rigid contacts without restitution that have closed at the instant, each once. With all modes states exclude
+// each other, and no contact may enter its stop.
+void Law::count_closings() {
+    if (model_->is_complete) return;
+    const double fastest =
+        std::max(instant.reached.level->highest_frequency(), instant.trial.level->highest_frequency());
+    if (!(fastest > 0.0)) return;
+    for (int i = 0; i < model_->size(); ++i) {
+        if (!model_->elements[i].is_rigid() || model_->elements[i].restitution > 0.0) continue;
+        const bool closes = std::any_of(
+            instant.changes.begin() + instant.first_change, instant.changes.end(), [i](const Change& change) {
+                return change.element == i && change.left == open_state && change.entered > open_state;
+            });
+        if (closes) exchanges_->count(i, instant.time, 1.0 / fastest);
+    }
+}
+
+bool Law::release_held(double start) {
+    State& reached = instant.reached;
+    std::fill(instant.asked.begin(), instant.asked.end(), no_request);
+    bool any = false;
+    for (int i = 0; i < model_->size(); ++i) {
+        if (reached.level->state(i) != open_state || !exchanges_->is_released(i, start, instant.time)) continue;
+        const int k = reached.level->first_guard(i);
+        const Guard& guard = reached.level->guards()[k];
+        reached.phases[k] = phase_of(reached, guard);
+        if (reached.phases[k] != Phase::refused) continue;
+        instant.asked[i] = guard.target;
+        any = true;
+    }
+    return any;
 }
 
 void Law::arm(State& reached, int guard) {

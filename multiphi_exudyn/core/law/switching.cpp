@@ -68,7 +68,7 @@ bool Law::would_pull_if_closed(const State& state, int element) {
     if (model_->elements[element].kind != Kind::viscous || level.state(element) != open_state) return false;
     const Signal& signal = levels_->entered_signal(level, level.first_guard(element));
     int sign = signal_sign(state, signal, mapped_size(state, signal));
-    if (sign == 0) sign = becomes(state, signal, 0);
+    if (sign == 0) sign = first_derivative_sign(state, signal, 0);
     if (sign > 0) sign = rate_sign(state, signal, *inputs_);
     return sign <= 0;
 }
