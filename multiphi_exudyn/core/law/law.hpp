@@ -11,6 +11,18 @@
 // be. The truncated bases of two levels need not agree, so the law says what happens then, in twelve sentences. Each
 // stands above the functions that implement it. All instants are roots of analytic signals, so nothing depends on
 // sampling.
+//
+// How the functions call each other at an instant (each in the file of its name, or where it says so):
+//
+//     Run::advance_segment   watch, and at the first descent collect_requests                    (monitoring.cpp)
+//     decide                 the state right after the instant, and what has changed and is lost
+//       settle               decides until no element that is refused is still untreated         (decide.cpp)
+//         apply_requests     passes what is requested on                                         (decide.cpp)
+//           strike             rigid contacts that close: impact.cpp, restitution.cpp, then rest.cpp
+//           close_without_impact                                                                 (strike.cpp)
+//           stick_together     friction at rest                                                  (stick.cpp)
+//           switch_states      all others                                                        (switching.cpp)
+//         enter              the state of the next level, with its phases                        (decide.cpp, phase.cpp)
 #pragma once
 
 #include <utility>
@@ -87,9 +99,10 @@ class Law {
     // the level in which all of them are open: first Moreau's impact, then complementarity of acceleration and reaction.
     // A contact closes only if its reaction in the level entered is >= 0. A contact counts as at rest at its stop also
     // if its free motion brings it back before its gap is more than round-off: this ends a sequence of ever smaller
-    // bounces. A contact that truncation has left inside its stop touches it too: with others at their stops it closes
-    // as soon as it is at rest there, and none of them is missing where all can carry. A contact whose gap the closed contacts already fix stays open at its stop, without a force: of redundant
-    // contacts an independent set carries all forces, of those that close together the roughest ones.
+    // bounces. A contact that truncation has left inside its stop touches it too, and is at rest if its free motion
+    // brings it back before its gap has risen to zero: where all together can carry, none of them is missing. A contact
+    // whose gap the closed contacts already fix stays open at its stop, without a force: of redundant contacts an
+    // independent set carries all forces, of those that close together the roughest ones.
     void strike();
     void close_without_impact(const Requests& requests);
     static bool is_inside(const State& state, int contact);
@@ -129,10 +142,11 @@ class Law {
     // (then it is armed), or until s in the level it would enter has risen to zero (then it changes). If it would then
     // repeat its request at the same instant, alone or in turn with others, it is *held back* until s has risen to zero,
     // or until another contact requests a change at a later instant, or changes. An impact of contacts that come inside
-    // their stops, after which all are as they were, does not take place, as it would be repeated without end: they close
-    // without it, or are refused. In truncated models a rigid contact without restitution that closes many times
-    // within a period of the fastest mode or load exchanges its state with others without end: what they do to each other so fast is no motion of
-    // these modes. It is held open for such a period, takes part in no impact meanwhile, and is then decided anew.
+    // their stops, after which all are as they were, does not take place, as it would be repeated without end: they
+    // close without it, or are refused. In truncated models a rigid contact without restitution that closes many times
+    // within a period of the fastest mode or load exchanges its state with others without end: what they do to each
+    // other so fast is no motion of these modes. It is held open for such a period, takes part in no impact meanwhile,
+    // and is then decided anew.
     void update_phases(State& state, const Flags* refused);
     void hold_back(State& state);
     void arm_return_guards();
@@ -152,8 +166,8 @@ class Law {
     // the level with it closed has risen to zero. It may stay closed only with a force >= 0, and may open if its force
     // would be negative. Truncation may leave it a force there at the instant at which it opens: it opens if this falls,
     // and closes when it has risen to as much again. If others that change at the instant make its force negative it
-    // opens too, after a change of its own. It bears no impulse: at the instant of an impact it keeps its state until that
-    // is over, and is decided with the velocities after it.
+    // opens too, after a change of its own. It bears no impulse: at the instant of an impact it keeps its state until
+    // that is over, and is decided with the velocities after it.
   private:
     bool follows_impact(const Requests& requests, int element) const;
     bool would_pull_if_closed(const State& state, int element);
@@ -192,9 +206,9 @@ class Law {
     // that touch and are struck with it, in one impact (Moreau); coupled ones must have one e. A touching contact that
     // leaves its stop has at least the e of those that are struck, or it would gain energy. A contact that others drive
     // back to its stop is struck again at the same instant, at the start too, until what is left is round-off. If any of
-    // them has friction, e is that of impulses: an impact without restitution, then one with at least e times its impulses
-    // (Poisson). A bounce that is too low or too short to be resolved is the last: it takes as long as all bounces that
-    // would follow, and at its end e is zero.
+    // them has friction, e is that of impulses: an impact without restitution, then one with at least e times its
+    // impulses (Poisson). A bounce that is too low or too short to be resolved is the last: it takes as long as all
+    // bounces that would follow, and at its end e is zero.
     void flag_touching(const Requests& requests);
     bool set_rebound_velocities(const State& state);
     void find_coupled(const Level& level);
