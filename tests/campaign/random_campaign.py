@@ -3,7 +3,7 @@
     python tests/campaign/random_campaign.py --kinds all --count 20000 --processes 2
 
 Case by case, each from its kind and number alone: no exception but a named one, and what must hold of every run
-(study/law_check.py). All kinds (campaign_scenes) but "plain" (strategies.py) and "lattice"
+(study/law_check.py). All kinds (campaign_scenes) but "plain" and "lattice"
 are judged by brute force (campaign_judge.py). With ``--kernels Prescott,Haswell`` the same cases run under each of
 these kernels of the linear algebra library, each in its own process, and their statuses, numbers of events and answers
 are compared.
@@ -29,7 +29,6 @@ import sys
 import time
 import warnings
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # a plain checkout
@@ -39,31 +38,22 @@ import campaign_judge
 import numpy as np
 import threadpoolctl
 from campaign_scenes import KINDS, numbers, scene_of
-from lawful import complaints
-from strategies import built, recipe_of
 
-from multiphi_exudyn import MultiPhiError, MultiPhiWarning, simulate
+from multiphi_exudyn import MultiPhiError, MultiPhiWarning
 from multiphi_exudyn.study.sweep import TimeLimitExceeded, call_within
 from reference_models.exudyn_quiet import quiet
 
 CHUNK = 100  # cases written at a time
 LONGEST = 900.0  # s: most cases take a tenth of a second; a run may never end
 NEAR = 1e-6  # of the largest displacement: the answers under two kernels
-INSTANTS = 40  # of a run, for its largest speed
 
-ALL_KINDS = ("plain", *KINDS)
 OWN_NAMES = {"Prescott": {"Katmai", "Prescott", "Nehalem"}}  # what OpenBLAS calls the kernels that were asked for
 
 
-def verdicts(number):
-    """What is to be said of a plain case, each (kind, cause); kinds that are not "failure: ..." are counted only."""
-    return _named(lambda: _verdicts(number))
-
-
 def judged(kind, number):
-    """(verdicts, digest) of a case of any kind; the digest is what every processor must agree on."""
-    if kind == "plain":
-        return verdicts(number), []
+    """(verdicts, digest) of a case: verdicts (kind, cause), of which failures have a kind "failure: ..."; the digest is
+    what every processor must agree on.
+    """
     digests = []
 
     def judge():
@@ -90,30 +80,6 @@ def _named(judge):
         return [("failure: exception", f"{type(error).__name__}: {' '.join(str(error).split())}")]
 
 
-def _verdicts(number):
-    case = built(recipe_of(number))
-    run = _run(case)
-    if run.message and "chatter" in run.message:  # a named failure of a run that need not have failed
-        return [("chatter", run.message)]
-    told = complaints(run, case.loads, (case.displacement, case.velocity))
-    found = [(f"failure: {text.split(':')[0]}", text) for text in told]
-    return found or [("ok" if run.status == "ok" else "named failure", run.message)]
-
-
-def _run(case):
-    start = {"displacement": case.displacement, "velocity": case.velocity}
-    return simulate(case.model, case.t_end, **start, loads=case.loads)
-
-
-def nudged(case, run, share):
-    """The case with another start, by a share of it; where that is zero, by a share of the speeds of its run."""
-    if np.any(case.displacement) or np.any(case.velocity):
-        factor = 1 + share
-        return replace(case, displacement=factor * case.displacement, velocity=factor * case.velocity)
-    speed = float(np.max(np.abs(run.velocity(np.linspace(0, run.t_end, INSTANTS)))))
-    return replace(case, velocity=share * speed * (-1.0) ** np.arange(len(case.velocity)))
-
-
 def chunk(cases):
     """Verdicts of these cases, (kind, number) each: counts of every kind, what is not ok, and digests."""
     counts, notable, digests, started = collections.Counter(), [], {}, time.process_time()
@@ -138,7 +104,7 @@ def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=100_000, help="cases, spread evenly over kinds")
     parser.add_argument("--first", type=int, default=0, help="number of the first case of every kind")
-    parser.add_argument("--kinds", default="plain", help=f"all, or some of {', '.join(ALL_KINDS)}")
+    parser.add_argument("--kinds", default="plain", help=f"all, or some of {', '.join(KINDS)}")
     parser.add_argument("--kernels", default="", help="OpenBLAS kernels to run under, e.g. Prescott,Haswell,SkylakeX")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("random-campaign.jsonl"), help="finished chunks, one a line")
@@ -148,9 +114,9 @@ def main(arguments=None):
     asked = os.environ.get("OPENBLAS_CORETYPE")
     if asked and kernel() not in OWN_NAMES.get(asked, {asked}):
         parser.error(f"OPENBLAS_CORETYPE: got {asked}, the library runs {kernel()}: this processor has no such kernel")
-    kinds = ALL_KINDS if given.kinds == "all" else tuple(given.kinds.split(","))
-    if unknown := set(kinds) - set(ALL_KINDS):
-        parser.error(f"--kinds: got {', '.join(sorted(unknown))}, need some of {', '.join(ALL_KINDS)}")
+    kinds = KINDS if given.kinds == "all" else tuple(given.kinds.split(","))
+    if unknown := set(kinds) - set(KINDS):
+        parser.error(f"--kinds: got {', '.join(sorted(unknown))}, need some of {', '.join(KINDS)}")
     return _campaign(numbers(kinds, given.first, given.count), given)
 
 

@@ -1,7 +1,7 @@
 """Hard random cases: what must hold of every run, laws of contact, and equivalences of two routes to one answer.
 
-The cases are those of strategies.py. An equivalence is asked for until the two runs' events part, which in a sensitive
-case they do: a start nudged by round-off then parts from both.
+The cases are plain scenes (campaign_scenes/plain.py). An equivalence is asked for until the two runs' events part,
+which in a sensitive case they do: a start nudged by round-off then parts from both.
 """
 
 import dataclasses
@@ -9,13 +9,15 @@ import math
 
 import numpy as np
 import pytest
+from campaign_judge import reordered
+from campaign_scenes.plain import CHOICES, Recipe, built, cases, recipe_of
+from campaign_scenes.units import in_units
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lawful import complaints
-from random_campaign import main, nudged, recipe_of, verdicts
-from strategies import CHOICES, Recipe, built, cases
+from random_campaign import judged, main
 
-from multiphi_exudyn import ConstantLoad, LinearStructure, MultiPhiModel, UnilateralContact, simulate
+from multiphi_exudyn import ConstantLoad, simulate
 from multiphi_exudyn.time.segments import Segments
 
 DISTINCT = ("chain", "free chain", "dense", "wide")  # frequencies: of repeated ones a truncated basis may keep any
@@ -105,6 +107,15 @@ def found_in(case):
     if np.max(np.abs(places)) < SMALLEST:
         return [] if run.status == "ok" else [run.message]
     return complaints(run, case.loads, (case.displacement, case.velocity), exact=EXACT)
+
+
+def nudged(case, run, share):
+    """The case with another start, by a share of it; where that is zero, by a share of the speeds of its run."""
+    if np.any(case.displacement) or np.any(case.velocity):
+        factor = 1 + share
+        return dataclasses.replace(case, displacement=factor * case.displacement, velocity=factor * case.velocity)
+    speed = float(np.max(np.abs(run.velocity(np.linspace(0, run.t_end, 40)))))
+    return dataclasses.replace(case, velocity=share * speed * (-1.0) ** np.arange(len(case.velocity)))
 
 
 def comparable(run):
@@ -230,7 +241,7 @@ class TestTwoRoutesOneAnswer:
     def test_permuted_coordinates_give_the_permuted_answer(self, case, seed):
         plain = run_of(case)
         order = np.random.default_rng(seed).permutation(case.model.structure.n)
-        permuted = run_of(_permuted(case, order))
+        permuted = run_of(reordered(case, order))
         if comparable(plain) and not sensitive(case, plain.t_end):
             assert_near(permuted.displacement(plain.t_end), plain.displacement(plain.t_end)[order])
 
@@ -241,7 +252,7 @@ class TestTwoRoutesOneAnswer:
     def test_other_units_give_the_scaled_answer(self, case, length, mass):
         """Masses in another unit, lengths in another one: forces scale with both, times with neither."""
         plain = run_of(case)
-        scaled = run_of(_scaled(case, length, mass))
+        scaled = simulate(*in_units(case, 1.0, length, mass))
         if comparable(plain) and not sensitive(case, plain.t_end):
             assert_near(scaled.displacement(plain.t_end) / length, plain.displacement(plain.t_end))
 
@@ -321,7 +332,7 @@ class TestCampaign:
         case = built(recipe_of(number))
         assert not np.any(case.displacement)
         assert not np.any(case.velocity)
-        assert verdicts(number) == [("ok", "")]
+        assert judged("plain", number)[0] == [("ok", "")]
 
     @pytest.mark.parametrize(
         "number",
@@ -332,16 +343,16 @@ class TestCampaign:
         ],
     )
     def test_cases_that_were_hard_are_right(self, number):
-        assert verdicts(number) == [("ok", "")]
+        assert judged("plain", number)[0] == [("ok", "")]
 
     @pytest.mark.parametrize("number", [1933, 109663])
     def test_round_off_of_an_impact_is_rest(self, number):
         """A plastic impact leaves 1e-16 of a speed: bounces of it, or of a gap that faces the stop, never end."""
-        assert verdicts(number) == [("ok", "")]
+        assert judged("plain", number)[0] == [("ok", "")]
 
     def test_a_reaction_has_the_round_off_of_a_level_whose_equilibrium_is_far_away(self):
         """While it is open a soft spring would hold 19 N at 7.4 m; closed, a stiff one turns 4e-16 m into 1e-8 N."""
-        assert verdicts(7014936) == [("ok", "")]
+        assert judged("plain", 7014936)[0] == [("ok", "")]
 
     def test_goes_on_where_it_was(self, tmp_path, capsys):
         arguments = ["--processes", "1", "--out", str(tmp_path / "chunks"), "--count"]
@@ -354,43 +365,14 @@ class TestCampaign:
         def broken(*given, **named):
             raise ZeroDivisionError("float division by zero")
 
-        monkeypatch.setattr("random_campaign.simulate", broken)
-        assert verdicts(3) == [("failure: exception", "ZeroDivisionError: float division by zero")]
+        monkeypatch.setattr("campaign_judge.mp.simulate", broken)
+        assert judged("plain", 3)[0] == [("failure: exception", "ZeroDivisionError: float division by zero")]
 
     def test_names_a_run_that_does_not_end(self, monkeypatch):
         def endless(*given, **named):
             while True:
                 pass
 
-        monkeypatch.setattr("random_campaign.simulate", endless)
+        monkeypatch.setattr("campaign_judge.mp.simulate", endless)
         monkeypatch.setattr("random_campaign.LONGEST", 0.2)
-        assert verdicts(3) == [("failure: endless", "not finished after 0.2 s")]
-
-
-def _permuted(case, order):
-    old = case.model.structure
-    damping = old.damping if not isinstance(old.damping, np.ndarray) else old.damping[np.ix_(order, order)]
-    points = {name: row[order] for name, row in old.points.items()}
-    structure = LinearStructure(old.mass[np.ix_(order, order)], old.stiffness[np.ix_(order, order)], damping, points)
-    contacts = [dataclasses.replace(c, direction=old.row(c.direction)[order]) for c in case.model.contacts]
-    return dataclasses.replace(
-        case,
-        model=MultiPhiModel(structure, contacts, case.model.modes),
-        displacement=case.displacement[order],
-        velocity=case.velocity[order],
-        loads=[ConstantLoad(old.row(load.at)[order], load.force) for load in case.loads],
-    )
-
-
-def _scaled(case, length, mass):
-    old = case.model.structure
-    damping = old.damping if old.damping is None else mass * old.damping
-    structure = LinearStructure(mass * old.mass, mass * old.stiffness, damping, old.points)
-    contacts = [UnilateralContact(c.name, c.direction, length * c.gap, mass * c.stiffness) for c in case.model.contacts]
-    return dataclasses.replace(
-        case,
-        model=MultiPhiModel(structure, contacts, case.model.modes),
-        displacement=length * case.displacement,
-        velocity=length * case.velocity,
-        loads=[dataclasses.replace(load, force=mass * length * load.force) for load in case.loads],
-    )
+        assert judged("plain", 3)[0] == [("failure: endless", "not finished after 0.2 s")]

@@ -5,11 +5,11 @@ import warnings
 
 import numpy as np
 import pytest
+from campaign_scenes.plain import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from small_structures import chain, random_model
-from strategies import cases
 
 from multiphi_exudyn import (
     ConstantLoad,

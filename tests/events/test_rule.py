@@ -8,12 +8,12 @@ import math
 
 import numpy as np
 import pytest
+from campaign_scenes.plain import built, recipe_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lawful import complaints
 from numpy.testing import assert_allclose
 from small_structures import chain, oscillator, random_model, stop
-from strategies import built, recipe_of
 
 from multiphi_exudyn import (
     ConstantLoad,

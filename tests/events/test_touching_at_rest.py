@@ -6,11 +6,11 @@ the products of a load with the modes.
 
 import numpy as np
 import pytest
+from campaign_scenes.plain import built, recipe_of
 from numpy.testing import assert_allclose
 from scipy.linalg import expm
 from scipy.optimize import brentq
 from small_structures import chain, stop
-from strategies import built, recipe_of
 
 from multiphi_exudyn import ConstantLoad, LinearStructure, MultiPhiModel, UnilateralContact, simulate
 

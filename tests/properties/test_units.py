@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from campaign_scenes.plain import built, recipe_of
 from numpy.testing import assert_allclose
-from strategies import built, recipe_of
 from units import Units, in_units
 
 import multiphi_exudyn as mp

@@ -5,7 +5,7 @@ free bodies, dry friction.
 A scene holds the arguments of ``simulate`` and the same system in plain numbers for brute force (brute_force). Each
 has an answer: no start lies inside a rigid stop, and rigid stops do not contradict each other.
 
-Order: parts, loads, kinds, sliders, lattice, coincidences, units, borders, bodies, crowds.
+Order: parts, plain, loads, kinds, sliders, lattice, coincidences, units, borders, bodies, crowds.
 """
 
 import itertools
@@ -14,16 +14,19 @@ from dataclasses import replace
 import numpy as np
 
 from campaign_scenes import bodies, borders, coincidences, crowds, kinds, lattice, sliders
+from campaign_scenes.plain import plain_scene
 from campaign_scenes.units import later, scaled
 
 __all__ = ["KINDS", "later", "numbers", "scaled", "scene_of"]
 
 DRAWN = kinds.DRAWN | sliders.DRAWN | lattice.DRAWN | borders.DRAWN | coincidences.DRAWN | bodies.DRAWN | crowds.DRAWN
-KINDS = tuple(DRAWN)
+KINDS = ("plain", *DRAWN)
 
 
 def scene_of(kind, number):
     """The scene of this kind with this number."""
+    if kind == "plain":
+        return plain_scene(number)
     seeds = [number, *kind.encode(), 14]
     return replace(DRAWN[kind](np.random.default_rng(seeds)), kind=kind, number=number)
 

@@ -1,4 +1,4 @@
-"""Random cases, the same for property tests and for long campaigns: a recipe of plain words, and what it builds.
+"""Plain scenes, the same for property tests and for long campaigns: a recipe of plain words, and what it builds.
 
 A recipe is drawn either by hypothesis (``recipes``) or from one integer (``recipe_of``), from one table of choices.
 The cases are hard on purpose: rigid-body modes, repeated and widely spread frequencies, contacts in preload, at zero
@@ -6,13 +6,13 @@ distance or facing each other at one place, starts exactly on a stop, soft conta
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import scipy.linalg
 from hypothesis import strategies as st
 
+from campaign_scenes.parts import Scene
 from multiphi_exudyn import (
     ConstantLoad,
     LinearStructure,
@@ -60,17 +60,6 @@ class Recipe:
     load: str = "none"
 
 
-@dataclass(frozen=True)
-class Case:
-    """Arguments of one run of ``simulate``."""
-
-    model: MultiPhiModel
-    t_end: float
-    displacement: np.ndarray
-    velocity: np.ndarray
-    loads: Sequence[ConstantLoad] = field(default_factory=tuple)
-
-
 def recipes(**fixed):
     """A hypothesis strategy; ``fixed`` narrows choices, each to one word or to a tuple of words."""
     drawn = {name: st.sampled_from(options) for name, options in _options(fixed).items()}
@@ -84,8 +73,13 @@ def recipe_of(number, **fixed):
     return Recipe(seed=number, **drawn)
 
 
+def plain_scene(number):
+    """The scene with this number."""
+    return replace(built(recipe_of(number)), number=number)
+
+
 def built(recipe):
-    """The case of a recipe."""
+    """The scene of a recipe."""
     random = np.random.default_rng([recipe.seed, 1])
     mass, stiffness = _matrices(recipe.structure, recipe.size, random)
     n = len(mass)
@@ -95,11 +89,12 @@ def built(recipe):
     model = MultiPhiModel(structure, contacts, modes=_modes(recipe.modes, n - len(contacts), random))
     loads = _loads(recipe.load, mass, random)
     displacement, velocity = _start(recipe.start, model, random)
-    return Case(model, _duration(mass, stiffness, contacts), displacement, velocity, loads)
+    t_end = _duration(mass, stiffness, contacts)
+    return Scene("plain", recipe.seed, model, t_end, displacement, velocity, loads, None, by_laws=True)
 
 
 def cases(**fixed):
-    """A hypothesis strategy of cases."""
+    """A hypothesis strategy of scenes."""
     return recipes(**fixed).map(built)
 
 
