@@ -69,7 +69,7 @@ class Record(Segments):
         return np.asarray(self.trajectory.instants)[1 : len(self) + 1]
 
     @functools.cached_property
-    def visited(self) -> tuple[tuple[int, ...], ...]:  # type: ignore[override]
+    def visited(self) -> tuple[tuple[int, ...], ...]:
         """States of the elements of the visited levels."""
         return tuple(map(tuple, self.trajectory.keys))
 
