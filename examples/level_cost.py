@@ -1,9 +1,9 @@
 """What a new level costs, one contact away from the open one: all that its first event needs.
 
 A cantilever of 200 degrees of freedom over stops, all of its modes in the base, 12 in a level. Of every level the modes
-are found first; then the core is given the level, and makes its motion, gaps and guards, the map to it and the map
-back. CPU time of this thread up to each of these, median of many new levels; code and base are warm. Threads of BLAS
-that have built the base spin for a while after it, and are not counted.
+are found first, whatever the loads are; then its static response, its motion, gaps and guards, the map to it and the
+map back. CPU time of this thread up to each of these, median of many new levels; code and base are warm. Threads of
+BLAS that have built the base spin for a while after it, and are not counted.
 
 Run: python examples/level_cost.py
 """
@@ -17,14 +17,13 @@ import time
 import numpy as np
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.time.core_levels import core_levels
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
 
 LENGTH, ELEMENTS, STOPS, GAP = 1.0, 100, 12, 1e-3  # m, , , m
 MODES, ROUNDS = 12, 20
 STIFFNESSES = {"compliant": 1e6, "rigid": math.inf}  # N/m
 DAMPINGS = {"Rayleigh damping": mp.RayleighDamping(0.5, 1e-6), "modal damping": mp.ModalDamping(0.01)}
-STEPS = ("level", "in the core", "map", "map back")
+STEPS = ("modes", "level", "map", "map back")
 
 
 def cantilever(stiffness: float, damping: mp.RayleighDamping | mp.ModalDamping) -> mp.MultiPhiModel:
@@ -40,11 +39,11 @@ def cantilever(stiffness: float, damping: mp.RayleighDamping | mp.ModalDamping) 
 
 def costs(model: mp.MultiPhiModel) -> list[list[float]]:
     """CPU times [ms] of every level one contact away from the open one, up to the end of each of the ``STEPS``."""
-    levels, rows = core_levels(LoadedLevels.static(model, np.zeros(model.base.modes.count))), list[list[float]]()
+    levels, rows = LoadedLevels.static(model, np.zeros(model.base.modes.count)).in_core, list[list[float]]()
     open_level = levels.level([0] * len(model.contacts))
     for i in range(len(model.contacts)):
         times = [time.thread_time()]
-        model.level_at((i,))
+        model.modal_levels.level([i])
         times.append(time.thread_time())
         new = levels.level([int(k == i) for k in range(len(model.contacts))])
         times.append(time.thread_time())

@@ -7,7 +7,6 @@ from multiphi_exudyn.errors import (
     MultiPhiWarning,
     NumericalFailure,
 )
-from multiphi_exudyn.events.transitions.state import Event
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.level.level_override import LevelOverride
@@ -40,6 +39,7 @@ from multiphi_exudyn.time.ledger import Ledger
 from multiphi_exudyn.time.many import ManyRuns, simulate_many
 from multiphi_exudyn.time.saved import SavedTrajectory, load_trajectory
 from multiphi_exudyn.time.simulate import simulate
+from multiphi_exudyn.time.state import Event
 from multiphi_exudyn.time.trajectory import Trajectory
 from multiphi_exudyn.time.truncation import truncation_indicator
 from multiphi_exudyn.version import __version__

@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.state import Phase, State
-from multiphi_exudyn.events.transitions.transition import Transition
 from multiphi_exudyn.levels.model.model import MultiPhiModel
+from multiphi_exudyn.time.loaded_level import LoadedLevel
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
+from multiphi_exudyn.time.state import Phase, State
 
 __all__ = ["Signal", "SpringRule"]
 
@@ -67,8 +67,7 @@ class SpringRule:
 
     def __init__(self, model: MultiPhiModel) -> None:
         self.model = model
-        self._levels: dict[tuple[int, ...], LoadedLevel] = {}
-        self._transitions: dict[tuple[tuple[int, ...], tuple[int, ...]], Transition] = {}
+        self._levels = LoadedLevels.static(model, np.zeros(model.base.modes.count))
 
     def start(self, displacement: np.ndarray) -> State:
         """The first state of a run from rest at y (m,) in base coordinates."""
@@ -83,10 +82,9 @@ class SpringRule:
 
     def level(self, closed: Iterable[int]) -> LoadedLevel:
         """The level with these contacts closed."""
-        key = tuple(sorted(closed))
-        if key not in self._levels:
-            self._levels[key] = LoadedLevel.of(self.model.level_at(key), np.zeros(self.model.base.modes.count))
-        return self._levels[key]
+        states = np.zeros(len(self.model.contacts), int)
+        states[list(closed)] = 1
+        return self._levels.level(states.tolist())
 
     def signal(self, level: LoadedLevel, contact: int) -> Signal:
         """s of a contact in a level."""
@@ -97,15 +95,9 @@ class SpringRule:
     def entered_signal(self, level: LoadedLevel, contact: int) -> Signal:
         """s of a contact after its change, as a signal of the state before the change."""
         target = self.level({contact}.symmetric_difference(level.level.indices))
-        move, there = self._transition(level, target), self.signal(target, contact)
+        (matrix, offset), there = _transition(level, target), self.signal(target, contact)
         row = there.row[: target.level.modes]
-        return Signal(np.pad(row @ move.matrix, (0, level.level.modes)), there.constant + float(row @ move.offset))
-
-    def _transition(self, source: LoadedLevel, target: LoadedLevel) -> Transition:
-        key = source.level.indices, target.level.indices
-        if key not in self._transitions:
-            self._transitions[key] = Transition(source, target)
-        return self._transitions[key]
+        return Signal(np.pad(row @ matrix, (0, level.level.modes)), there.constant + float(row @ offset))
 
     def _resolve_refused(self, state: State, treated: set[int]) -> State:
         """State after the requests of all contacts that are refused at this instant."""
@@ -135,8 +127,8 @@ class SpringRule:
     def _after_change(self, state: State, changing: set[int]) -> State:
         """State in the level after the change of these contacts (eq. 38.6)."""
         level = self.level(changing.symmetric_difference(state.level.level.indices))
-        move = self._transition(state.level, level)
-        displacement, velocity = move.displacement(state.displacement), move.velocity(state.velocity)
+        matrix, offset = _transition(state.level, level)
+        displacement, velocity = matrix @ state.displacement + offset, matrix @ state.velocity
         return replace(state, level=level, displacement=displacement, velocity=velocity)
 
     def _with_phases(self, state: State, refused: Iterable[int] = ()) -> State:
@@ -172,3 +164,9 @@ def _motion(state: State) -> _Motion:
         sizes.append(np.abs(a) @ sizes[-1] + np.abs(constant))
         constant = np.zeros(2 * plain.modes)
     return _Motion(np.array(values), np.array(sizes))
+
+
+def _transition(source: LoadedLevel, target: LoadedLevel) -> tuple[np.ndarray, np.ndarray]:
+    """T = Psi_m^T Psi_l and c = Psi_m^T (y_l - y_m) of eq. (38.6)."""
+    jump = source.asymptotic.configuration - target.asymptotic.configuration
+    return target.level.vectors.T @ source.level.vectors, target.level.vectors.T @ jump

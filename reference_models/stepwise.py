@@ -18,9 +18,9 @@ import numpy as np
 from scipy.integrate import OdeSolution, solve_ivp
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.state import Phase, State
 from multiphi_exudyn.levels.model.model import MultiPhiModel
+from multiphi_exudyn.time.loaded_level import LoadedLevel
+from multiphi_exudyn.time.state import Phase, State
 from reference_models.spring_rule import Signal, SpringRule
 
 __all__ = ["StepwiseHistories", "StepwiseRun", "solve_stepwise"]

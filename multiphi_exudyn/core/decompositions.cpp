@@ -7,6 +7,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <Eigen/SVD>
 
 #include "failure.hpp"
@@ -220,6 +221,69 @@ double condition(const ComplexMatrix& matrix) {
     Matrix real(2 * n, 2 * n);  // has every singular value twice
     real << matrix.real(), -matrix.imag(), matrix.imag(), matrix.real();
     return condition(real);
+}
+
+OrthogonalTriangular orthogonal_triangular(const Matrix& matrix) {
+    const Index n = matrix.cols();
+    const Eigen::HouseholderQR<Eigen::MatrixXd> factors{Eigen::MatrixXd(matrix)};
+    OrthogonalTriangular result{Matrix::Identity(matrix.rows(), n), Matrix::Zero(n, n)};
+    Eigen::MatrixXd basis = Eigen::MatrixXd::Identity(matrix.rows(), n);
+    basis.applyOnTheLeft(factors.householderQ());
+    result.basis = basis;
+    result.triangle = factors.matrixQR().topRows(n).triangularView<Eigen::Upper>();
+    return result;
+}
+
+Matrix null_space(const Matrix& matrix) {
+    const Index m = matrix.rows(), n = matrix.cols();
+    if (n == 0) return Matrix::Identity(m, m);
+    const Eigen::HouseholderQR<Eigen::MatrixXd> factors{Eigen::MatrixXd(matrix)};
+    Eigen::MatrixXd basis = Eigen::MatrixXd::Identity(m, m).rightCols(m - n);
+    basis.applyOnTheLeft(factors.householderQ());
+    return basis;
+}
+
+LeftSingularVectors left_singular_vectors(const Matrix& matrix) {
+    if (matrix.size() == 0) return {Matrix(matrix.rows(), 0), Vector(0)};
+    const Eigen::BDCSVD<Eigen::MatrixXd> factors(matrix, Eigen::ComputeThinU);
+    return {factors.matrixU(), factors.singularValues()};
+}
+
+LinearSolver::LinearSolver(Matrix matrix) : matrix_(std::move(matrix)) {
+    const Index n = matrix_.rows();
+    if (n == 0) return;
+    const Eigen::PartialPivLU<Eigen::MatrixXd> factors{Eigen::MatrixXd(matrix_)};
+    triangles_ = factors.matrixLU();
+    is_singular_ = (triangles_.diagonal().array() == 0.0).any();
+    rows_.resize(static_cast<std::size_t>(n));
+    const auto& places = factors.permutationP().indices();
+    for (Index i = 0; i < n; ++i) rows_[static_cast<std::size_t>(places[i])] = static_cast<int>(i);
+}
+
+Vector LinearSolver::solution(const Vector& b) const {
+    if (matrix_.rows() == 0) return Vector(0);
+    if (is_singular_) return least_squares(matrix_, b);
+    Vector result = b(rows_);
+    triangles_.triangularView<Eigen::UnitLower>().solveInPlace(result);
+    triangles_.triangularView<Eigen::Upper>().solveInPlace(result);
+    return result;
+}
+
+Vector least_squares(const Matrix& a, const Vector& b) {
+    if (a.cols() == 0) return Vector(0);
+    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors;
+    factors.setThreshold(std::numeric_limits<double>::epsilon() * static_cast<double>(std::max(a.rows(), a.cols())));
+    factors.compute(a);
+    return factors.solve(b);
+}
+
+double determinant(const Matrix& matrix) {
+    return matrix.rows() == 0 ? 1.0 : Eigen::PartialPivLU<Eigen::MatrixXd>(matrix).determinant();
+}
+
+Matrix solve(const Matrix& a, const Matrix& b) {
+    if (a.rows() == 0) return Matrix(0, b.cols());
+    return Eigen::PartialPivLU<Eigen::MatrixXd>(a).solve(b);
 }
 
 ComplexMatrix solve(const ComplexMatrix& a, const ComplexMatrix& b) {

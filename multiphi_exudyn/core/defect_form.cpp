@@ -9,10 +9,10 @@ namespace multiphi {
 
 namespace {
 
-// Directions (h, m) of the rigid links that hold in a level.
-Matrix rigid_directions(const Level& level) {
+// Directions (h, m) of the rigid links that hold in a level, and of links that an impact has stopped.
+Matrix rigid_directions(const Level& level, const std::vector<int>& stopped) {
     const Base& base = level.model().base;
-    std::vector<int> rigid;
+    std::vector<int> rigid = stopped;
     for (const int link : level.data().links)
         if (base.constrains(link)) rigid.push_back(link);
     return base.directions(rigid, Eigen::all);
@@ -32,11 +32,11 @@ Matrix allowed(const Matrix& directions, const Matrix& motions) {
 
 }  // namespace
 
-DefectForm::DefectForm(const Transition& transition) {
+DefectForm::DefectForm(const Transition& transition, const std::vector<int>& stopped) {
     const Level &source = *transition.source, &target = *transition.target;
-    const Matrix held = rigid_directions(target), before = shapes(source), after = shapes(target);
+    const Matrix held = rigid_directions(target, {}), before = shapes(source), after = shapes(target);
     const int n = source.width(), r = target.width();
-    const Vector& periods = source.model().periods;
+    const Vector& periods = source.model().base.periods;
     Matrix motions(before.rows(), 1 + n + r);
     motions.col(0) = source.data().configuration - target.data().configuration - after * transition.offset;
     motions.middleCols(1, n) = before - after * transition.matrix;
@@ -46,7 +46,7 @@ DefectForm::DefectForm(const Transition& transition) {
     Matrix rates(before.rows(), n + r);
     rates.leftCols(n) = before - after * transition.velocity_matrix;
     rates.rightCols(r) = after;
-    moving = triangular_factor(periods.asDiagonal() * allowed(held, rates));
+    moving = triangular_factor(periods.asDiagonal() * allowed(rigid_directions(target, stopped), rates));
 }
 
 double DefectForm::squares(const double* displaced_by, const double* moved_by, int count) const {

@@ -13,6 +13,8 @@
 // no difference of two states is formed.
 #pragma once
 
+#include <vector>
+
 #include "linear_algebra.hpp"
 #include "transition.hpp"
 
@@ -22,7 +24,8 @@ struct DefectForm {
     Matrix displaced;  // (1 + n_l + n_m, the same): |d| = |displaced (1, xi_l, s)|
     Matrix moving;     // (n_l + n_m, the same): |w / Omega| = |moving (xi'_l, s')|
 
-    explicit DefectForm(const Transition& transition);
+    // stopped: numbers of links along which an impact has left no velocity.
+    explicit DefectForm(const Transition& transition, const std::vector<int>& stopped = {});
 
     // |d|^2 + |w / Omega|^2 for vectors of the first `count` entries of (xi_l, s) and (xi'_l, s'); the others are zero.
     double squares(const double* displaced_by, const double* moved_by, int count) const;

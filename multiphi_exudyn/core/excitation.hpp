@@ -65,6 +65,8 @@ struct Excitation {
     int prescribed = 0;               // number of channels that are functions of time
     double highest_frequency = 0.0;   // of these [Hz]
     bool is_isolated = false;         // no load acts, so the energy never exceeds that at the start
+    std::vector<int> rate_of;         // of each channel the one that is its derivative, -1 where none is needed
+    int steady = -1;                  // the channel that is always one, -1 for none
     Intervals intervals;
 
     int channels() const { return static_cast<int>(patterns.cols()); }

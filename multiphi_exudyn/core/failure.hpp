@@ -3,6 +3,8 @@
 
 #include <array>
 #include <exception>
+#include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -43,5 +45,20 @@ class NumericalFailure : public std::exception {
     std::vector<int> elements_;
     std::array<double, 3> details_;
 };
+
+// Why a level cannot be built, in a sentence.
+class LevelFailure : public std::runtime_error {
+  public:
+    using std::runtime_error::runtime_error;
+};
+
+// What a user has to give otherwise, in a sentence.
+class ArgumentError : public std::runtime_error {
+  public:
+    using std::runtime_error::runtime_error;
+};
+
+// A number in a message, with six digits.
+std::string text_of(double number);
 
 }  // namespace multiphi

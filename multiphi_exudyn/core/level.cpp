@@ -63,7 +63,7 @@ Level Level::of_base(const Model& model, const Excitation& excitation) { return 
 
 Level::Level(const Model& model, const Excitation& excitation)
     : model_(&model), excitation_(&excitation), modes_(model.base.modes()), channels_(excitation.channels()),
-      prescribed_(excitation.prescribed), omega_(model.omega), periods_(model.periods),
+      prescribed_(excitation.prescribed), omega_(model.base.omega), periods_(model.base.periods),
       derived_(std::make_shared<Derived>()) {
     const int m = modes_, q = channels_, n = width();
     const Base& base = model.base;
@@ -262,7 +262,7 @@ StrainForm Level::make_strain() const {
     const Base& base = model_->base;
     const int n = width();
     const Matrix shapes = motion_shapes();
-    const Matrix bent = triangular_factor(model_->omega.asDiagonal() * shapes);
+    const Matrix bent = triangular_factor(model_->base.omega.asDiagonal() * shapes);
     const std::vector<int> links = springs();
     std::vector<int> given;  // modes whose frequency was given
     for (int i = 0; i < modes_; ++i)
@@ -340,7 +340,7 @@ Vector Level::make_struck_defects() const {
     for (Index k = 0; k < along.rows(); ++k) {
         const double square = along.row(k).squaredNorm();
         const double share = square > 0.0 ? along.row(k).dot(moved.row(k)) / square : 0.0;
-        const Vector left = (moved.row(k) - share * along.row(k)).transpose().cwiseProduct(model_->periods);
+        const Vector left = (moved.row(k) - share * along.row(k)).transpose().cwiseProduct(model_->base.periods);
         result[contacts[static_cast<std::size_t>(k)]] = left.squaredNorm();
     }
     return result;

@@ -82,9 +82,9 @@ std::vector<int> links_at(const std::vector<int>& closed, const std::vector<int>
 }
 
 // Sets the reactions of the rigid links; the forces of springs are there. Overwrites C_l psi.
-void set_reactions(const BaseRows& base, const std::vector<int>& closed, const std::vector<int>& rigid,
+void set_reactions(const Base& base, const std::vector<int>& closed, const std::vector<int>& rigid,
                    const Vector& squares, Matrix& damped, LevelRows& rows) {
-    Fit fit(base.observed(links_at(closed, rigid), Eigen::all));
+    Fit fit(base.directions(links_at(closed, rigid), Eigen::all));
     const double smallest = smallest_of(base.squares);
     Matrix residual(1, base.modes()), reactions;
     Vector weights(base.modes());
@@ -98,7 +98,7 @@ void set_reactions(const BaseRows& base, const std::vector<int>& closed, const s
         }
         for (std::size_t p = 0; p < closed.size(); ++p) {
             const double force = rows.forces(static_cast<Index>(p), j);
-            if (force != 0.0) residual.row(0) -= base.observed.row(closed[p]) * force;
+            if (force != 0.0) residual.row(0) -= base.directions.row(closed[p]) * force;
         }
         fit.coefficients(weights, residual, reactions);
         rows.forces(rigid, j) = reactions.col(0);
@@ -109,29 +109,30 @@ void set_reactions(const BaseRows& base, const std::vector<int>& closed, const s
 
 }  // namespace
 
-LevelRows level_rows(const BaseRows& base, const std::vector<int>& closed, const std::vector<int>& rigid,
-                     const Vector& squares, Matrix modes, Matrix damped, Matrix gaps, Matrix damping) {
+LevelRows level_rows(const Base& base, const std::vector<int>& closed, const Vector& squares, Matrix modes) {
     const Vector sign = signs(modes, base.observed, base.sizes);
     modes = sign.asDiagonal() * modes;
-    damped = sign.asDiagonal() * damped;
-    gaps = gaps * sign.asDiagonal();
-    damping = sign.asDiagonal() * damping * sign.asDiagonal();
-    const Index links = base.links();
-    const Vector lengths = base.sizes.head(links);
+    Matrix damped = base.damped(closed, modes);
+    Matrix damping = modes * damped.transpose();
+    Matrix gaps = base.directions * modes.transpose();
+    std::vector<int> rigid;
+    for (std::size_t p = 0; p < closed.size(); ++p) {
+        if (base.is_rigid(closed[p])) rigid.push_back(static_cast<int>(p));
+    }
     OrthonormalBasis held;
-    span(base.observed, base.sizes, links_at(closed, rigid), held);
-    const std::vector<bool> holds = following(base.observed.topRows(links), lengths, held);
+    span(base.directions, base.lengths(), links_at(closed, rigid), held);
+    const std::vector<bool> holds = following(base.directions, base.lengths(), held);
     const Vector negligible = negligible_gaps(squares);
-    for (Index i = 0; i < links; ++i) {
+    for (Index i = 0; i < gaps.rows(); ++i) {
         for (Index j = 0; j < gaps.cols(); ++j) {
-            if (holds[i] || std::abs(gaps(i, j)) <= negligible[j] * lengths[i]) gaps(i, j) = 0.0;
+            if (holds[i] || std::abs(gaps(i, j)) <= negligible[j] * base.sizes[i]) gaps(i, j) = 0.0;
         }
     }
     const Index k = static_cast<Index>(closed.size());
     Matrix forces(k, gaps.cols()), force_rates(k, gaps.cols());
     for (Index p = 0; p < k; ++p) {
-        forces.row(p) = base.restoring(0, closed[p]) * gaps.row(closed[p]);
-        force_rates.row(p) = base.restoring(1, closed[p]) * gaps.row(closed[p]);
+        forces.row(p) = -base.springs[closed[p]] * gaps.row(closed[p]);
+        force_rates.row(p) = -base.dampings[closed[p]] * gaps.row(closed[p]);
     }
     LevelRows rows{std::move(modes),  std::move(damping),     std::move(gaps),
                    std::move(forces), std::move(force_rates), holds};

@@ -2,11 +2,19 @@
 
 #include <utility>
 
+#include "level_builder.hpp"
+#include "modal_levels.hpp"
+
 namespace multiphi {
 
-Levels::Levels(std::shared_ptr<const Model> model, std::shared_ptr<const Excitation> excitation, Builder builder)
-    : model_(std::move(model)), excitation_(std::move(excitation)), builder_(std::move(builder)),
+Levels::Levels(std::shared_ptr<const Model> model, std::shared_ptr<const Excitation> excitation, double duration)
+    : model_(std::move(model)), excitation_(std::move(excitation)), duration_(duration),
       base_(Level::of_base(*model_, *excitation_)) {}
+
+LevelData Levels::data(const Key& key) const {
+    const std::shared_ptr<const MovingLevel> moving = model_->levels->level(model_->active_links(key));
+    return build_level(*model_, *excitation_, *moving, key, duration_);
+}
 
 const Level& Levels::level(const Key& key) {
     {
@@ -14,9 +22,9 @@ const Level& Levels::level(const Key& key) {
         const auto found = levels_.find(key);
         if (found != levels_.end()) return *found->second;
     }
-    // Without the lock: the builder may take long, and may wait for what another run holds.
-    LevelData data = builder_(key);
-    auto built = std::make_unique<const Level>(*model_, *excitation_, std::move(data), built_++);
+    // Without the lock: it takes its time.
+    LevelData known = data(key);
+    auto built = std::make_unique<const Level>(*model_, *excitation_, std::move(known), built_++);
     const std::unique_lock lock(mutex_);
     return *levels_.try_emplace(key, std::move(built)).first->second;
 }

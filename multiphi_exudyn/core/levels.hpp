@@ -1,12 +1,11 @@
 // Levels: the levels of one model under the loads of a run, and the transitions between them, made on first use.
 //
-// Any number of runs may use them at once. A level is asked for by its key; what modes it has comes from the builder
-// (Python's levels/), everything else is made here. What has been made keeps its address until it is forgotten.
+// Any number of runs may use them at once. A level is asked for by its key; the model has its modes, everything else is
+// made here. What has been made keeps its address until it is forgotten.
 #pragma once
 
 #include <atomic>
 #include <cstddef>
-#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -21,16 +20,16 @@ namespace multiphi {
 
 class Levels {
   public:
-    using Builder = std::function<LevelData(const Key&)>;
-
-    Levels(std::shared_ptr<const Model> model, std::shared_ptr<const Excitation> excitation, Builder builder);
+    // duration: of the longest motion in them [s].
+    Levels(std::shared_ptr<const Model> model, std::shared_ptr<const Excitation> excitation, double duration);
     virtual ~Levels() = default;
 
     const Model& model() const { return *model_; }
     const Excitation& excitation() const { return *excitation_; }
     const Level& base() const { return base_; }
-    const Builder& builder() const { return builder_; }
-    void set_builder(Builder builder) { builder_ = std::move(builder); }
+    double duration() const { return duration_; }
+    // What is known of the level of a key; throws LevelFailure where there is none.
+    LevelData data(const Key& key) const;
 
     virtual const Level& level(const Key& key);
     virtual const Transition& transition(const Level& source, const Level& target);
@@ -50,7 +49,7 @@ class Levels {
   private:
     std::shared_ptr<const Model> model_;
     std::shared_ptr<const Excitation> excitation_;
-    Builder builder_;
+    double duration_;
     Level base_;
     mutable std::shared_mutex mutex_;
     std::map<Key, std::unique_ptr<const Level>> levels_;

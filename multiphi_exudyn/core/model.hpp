@@ -1,56 +1,38 @@
-// Model: the coordinates that all levels share, and the elements (eqs. 38.1, 38.2 with all contacts open).
+// Model: the coordinates that all levels share, the elements, and the levels that they have (eqs. 38.1, 38.2).
 //
-//     x = Phi_0 y,   y'' + C y' + Omega^2 y = loads + forces of the links along their directions
-//
-// y (m,) are the modal coordinates of the open structure; its modes are mass-normalised. It never changes once it is
-// made, so that many runs may share it.
+// It never changes once it is made, but for the levels that it keeps, so that many runs may share it.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
+#include <memory>
 #include <vector>
 
+#include "base.hpp"
 #include "element.hpp"
 #include "linear_algebra.hpp"
 
 namespace multiphi {
 
-struct Base {
-    Vector squares;                 // Omega^2 (m,) [rad2/s2]
-    Matrix damping;                 // C (m, m) [1/s]
-    Matrix directions;              // h of every link (l, m)
-    Matrix force_directions;        // along which the links' forces act (l, m); h for most links
-    Vector gaps;                    // (l,) [m] at y = 0
-    Vector stiffnesses, dampings;   // (l,) [N/m], infinite if rigid; [N s/m]
-    Vector preload;                 // (m,) constant forces of force laws
-    double energy_offset = 0.0;     // [J] of the links at y = 0
-    std::vector<int> held;          // links with a stick position, in their order
-    std::vector<int> oblique;       // links whose force acts along another direction than their own
-    std::vector<int> residual;      // links that act through the flexibility of the modes left out (residual_boundary.hpp)
-    bool general = false;           // some elements have stick positions or constant forces besides their links
-
-    // Whether a link that acts takes a direction from the motion: a rigid one does, but on a residual boundary.
-    bool constrains(int link) const {
-        return std::isinf(stiffnesses[link]) && std::find(residual.begin(), residual.end(), link) == residual.end();
-    }
-    int modes() const { return static_cast<int>(squares.size()); }
-    int links() const { return static_cast<int>(directions.rows()); }
-};
+class ModalLevels;
 
 struct Model {
-    Base base;
+    std::shared_ptr<ModalLevels> levels;
+    const Base& base;                 // of these levels
     std::vector<Element> elements;
     std::vector<int> roughest_first;  // elements by friction at rigid contacts: of redundant ones the first carries
-    bool is_complete = true;          // its levels keep all modes, so no truncation is to be judged
-    int knots = 0;                    // of all force laws
+    bool is_complete;                 // its levels keep all modes, so no truncation is to be judged
+    int knots;                        // of all force laws
 
-    // Made from the above by `prepare`.
+    // Made from the above.
     Matrix unit_directions;           // (l, m)
-    Vector omega, periods;            // Omega and 1 / Omega, zero where Omega is zero (m,)
-    bool has_friction = false;        // or further links: an impulse may have another direction than its contact
+    bool has_friction;                // or further links: an impulse may have another direction than its contact
+
+    Model(std::shared_ptr<ModalLevels> levels, std::vector<Element> elements, std::vector<int> roughest_first,
+          bool is_complete, int knots);
+    Model(const Model&) = delete;
 
     int size() const { return static_cast<int>(elements.size()); }
-    void prepare();
+    // The links that act with the elements in these states, in ascending order; they determine the modes.
+    std::vector<int> active_links(const std::vector<int>& states) const;
 };
 
 }  // namespace multiphi

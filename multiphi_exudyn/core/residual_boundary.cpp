@@ -1,7 +1,9 @@
 #include "residual_boundary.hpp"
 
+#include <utility>
 #include <vector>
 
+#include "failure.hpp"
 #include "round_off.hpp"
 #include "symmetric_eigenpairs.hpp"
 
@@ -48,6 +50,32 @@ ResidualModes residual_modes(const Vector& squares, const Matrix& gaps, const Ma
     result.rotation << motions.leftCols(free), bending * modes.vectors;
     result.forces = -(stiffness * (gaps * result.rotation));
     return result;
+}
+
+ResidualBoundary::ResidualBoundary(std::shared_ptr<const MovingLevel> given)
+    : host(std::move(given)), links(host->modal.base().residual) {
+    const ModalLevel& level = host->modal;
+    const Base& base = level.base();
+    const Index c = static_cast<Index>(links.size());
+    shapes.resize(c, base.modes());
+    forces_of_host.resize(c, static_cast<Index>(level.links().size()));
+    compliances.resize(c);
+    for (Index i = 0; i < c; ++i) {
+        const Deflection beside = level.beside_modes(base.directions.row(links[static_cast<std::size_t>(i)]));
+        shapes.row(i) = beside.configuration;
+        forces_of_host.row(i) = beside.forces;
+        compliances[i] = 1.0 / base.stiffnesses[links[static_cast<std::size_t>(i)]];
+    }
+    const Matrix directions = base.directions(links, Eigen::all);
+    gaps = base.directions * shapes.transpose();
+    flexibility = gaps(links, Eigen::all);
+    for (Index i = 0; i < c; ++i) {
+        const double whole = directions.row(i).transpose().cwiseProduct(base.periods).squaredNorm();
+        if (compliances[i] != 0.0 || flexibility(i, i) > round_off::independent * whole) continue;
+        throw ArgumentError("boundary of '" + base.names[static_cast<std::size_t>(links[static_cast<std::size_t>(i)])] +
+                            "': got 'residual' for a rigid contact where all modes are kept, need 'own' or fewer modes");
+    }
+    flexibility = Matrix(flexibility + flexibility.transpose()) / 2.0;
 }
 
 }  // namespace multiphi

@@ -70,7 +70,7 @@ class Run {
     double& defects() { return defects_.sum; }  // the sum so far, which may begin anew
     Law& law() { return law_; }
 
-    // Advances to `end` [s], or to the first event. Throws NumericalFailure, or what the builder of levels throws; the
+    // Advances to `end` [s], or to the first event. Throws NumericalFailure, or the LevelFailure of a level; the
     // trajectory then ends at the instant of the failure.
     Ending advance(double end, bool stop_at_event);
 

@@ -8,6 +8,7 @@ namespace multiphi {
 
 Symmetric symmetric_eigenpairs(const Matrix& matrix) {
     const Index n = matrix.rows();
+    if (n == 0) return {Vector(0), Matrix(0, 0)};
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(matrix);
     if (solver.info() != Eigen::Success) throw NumericalFailure(Cause::indistinct_modes);
     // One step towards orthonormal vectors: states that go through them often keep their length.

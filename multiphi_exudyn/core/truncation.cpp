@@ -86,7 +86,7 @@ void Defects::add_start(const State& start, const State& after, const Instant& i
                      data.channel_shapes * after.displacement.tail(q);
     const Vector w = start.velocity.head(m) - data.modes * after.velocity.head(r) -
                      data.channel_shapes * after.velocity.tail(q);
-    sum += d.squaredNorm() + model.periods.cwiseProduct(w).squaredNorm();
+    sum += d.squaredNorm() + model.base.periods.cwiseProduct(w).squaredNorm();
 }
 
 // ---------------------------------------------------------------------- size of the motion

@@ -42,9 +42,6 @@ from typing import Any, Protocol
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.transitions.state import Event, Phase, State
 from multiphi_exudyn.exudyn_plugin.discretised_level import SteppedLevel
 from multiphi_exudyn.exudyn_plugin.solver import check_matched
 from multiphi_exudyn.exudyn_plugin.state import SAME_STEP, Coordinates, RunRecord
@@ -53,8 +50,11 @@ from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.time.law_warnings import law_times
+from multiphi_exudyn.time.loaded_level import LoadedLevel
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.segments import Segments
+from multiphi_exudyn.time.state import Event, Phase, State
 
 PHASES = tuple(Phase)
 TIME_ROUNDING = 1e-9  # of a step: a change this little after the end of a step is counted in it

@@ -41,9 +41,9 @@ from scipy.linalg import lapack
 
 import multiphi_exudyn._core as core
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
+from multiphi_exudyn.time.loaded_level import LoadedLevel
 
 KEPT = 16  # impedances: in base coordinates, and in the levels between which a body changes
 ROUND_OFF = 1e-15  # of the largest singular value: smaller ones count as zero
@@ -155,7 +155,8 @@ class Reactions:
 
     def _pushes(self, level: LoadedLevel) -> tuple[np.ndarray, np.ndarray]:
         """Pushes (b,) of elements, and the forces (m,) on points that they cause."""
-        push, base = level.alone.excitation.static - level.excitation.static, self._base
+        base = self._base
+        push = base.directions @ level.pushes
         for i in level.rubbing_elements:
             link = next(k for k in base.link_indices[i] if k in base.oblique and k in level.level.indices)
             push = push + (base.pushes[:, link] - base.directions[:, link]) * self._pressures[i]

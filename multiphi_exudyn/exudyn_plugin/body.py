@@ -27,7 +27,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from multiphi_exudyn.events.transitions.state import Event, Loss, State, total_loss
 from multiphi_exudyn.exudyn_plugin.alone import KnownMotion, RunAhead
 from multiphi_exudyn.exudyn_plugin.coupled import ExactMotion, StepwiseRun
 from multiphi_exudyn.exudyn_plugin.discretised_level import SteppedLevel
@@ -48,6 +47,7 @@ from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.run_warnings import warnings_of_body
+from multiphi_exudyn.time.state import Event, Loss, State, total_loss
 
 
 class StartedBody(Protocol):

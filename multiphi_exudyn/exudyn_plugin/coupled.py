@@ -52,9 +52,6 @@ import numpy as np
 
 import multiphi_exudyn._core as core
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.transitions.state import Event, Loss, Phase, State
 from multiphi_exudyn.exudyn_plugin.attached import AttachedParts, PointInertia, Reactions, SystemMatrices
 from multiphi_exudyn.exudyn_plugin.discretised_level import SteppedLevel
 from multiphi_exudyn.exudyn_plugin.solver import bodies_of
@@ -62,13 +59,14 @@ from multiphi_exudyn.exudyn_plugin.state import SAME_STEP, Coordinates, RunRecor
 from multiphi_exudyn.exudyn_plugin.step_test import OwnLoads, step_test
 from multiphi_exudyn.levels.core_model import core_model
 from multiphi_exudyn.levels.model.model import MultiPhiModel
-from multiphi_exudyn.mathematics.blas_threads import one_blas_thread
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT
 from multiphi_exudyn.mechanics.element import Element, event_kind
-from multiphi_exudyn.time.core_levels import core_excitation, level_data
 from multiphi_exudyn.time.law_warnings import laws_at_an_end
+from multiphi_exudyn.time.loaded_level import LoadedLevel
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
 from multiphi_exudyn.time.motion import failure, limits
+from multiphi_exudyn.time.state import Event, Loss, Phase, State
 
 LEVEL_BYTES = 2**29  # of all levels under held forces: with more they are made anew
 CORE_PHASES = {phase: getattr(core.Phase, phase.name.lower()) for phase in Phase}
@@ -175,12 +173,7 @@ class ExactMotion:
 
 def _held_levels(levels: LoadedLevels) -> core.HeldLevels:
     """Levels under held forces, each built on first use."""
-
-    @one_blas_thread()
-    def build(states: Sequence[int]) -> core.LevelData:
-        return level_data(levels.level(states))
-
-    return core.HeldLevels(core_model(levels.model), core_excitation(levels), build)
+    return core.HeldLevels(core_model(levels.model), levels.core_excitation(), levels.lasting)
 
 
 def _core_state(state: State) -> core.StepState:
@@ -315,7 +308,7 @@ class Surroundings:
             return self
         level, r, s = state.level.modal, state.level.modal.modes, self.body.coordinates.stepped.size
         x, v = state.displacement, state.velocity
-        eta_tt = state.level.alone.asymptotic.drive + force[:r]
+        eta_tt = state.level.asymptotic.static_drive + force[:r]
         eta_tt -= level.damping_matrix @ v[:r] + level.squares * x[:r] + level.coupling @ x[:r]
         reactions = _reactions_of(self.body, self.parts, state.level, (x, v, eta_tt), force[s:])
         return replace(self, reactions=reactions)

@@ -26,7 +26,7 @@ import numpy as np
 import scipy.linalg
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.time.loaded_level import LoadedLevel
 
 
 @dataclass(frozen=True)

@@ -419,7 +419,7 @@ class Interface:
         in_base, modal = self.in_base(level.base), self.map_in(stepped).rows[:, : level.modes]
         _, whole = level.static_response(force @ in_base, np.zeros(len(level.indices)))
         left_out = np.abs(in_base @ (whole - level.vectors @ static_shift(level, force @ modal)))
-        lengths = np.sqrt(in_base[:, level.base.modes.rigid :] ** 2 @ level.base.compliance)
+        lengths = np.linalg.norm(in_base * level.base.periods, axis=1)
         moved = np.abs(self._views[0][self.indices])
         flexible = lengths > 0
         largest = float(np.max(moved[flexible] / lengths[flexible], initial=0.0))

@@ -24,13 +24,13 @@ from exudyn.itemInterface import SensorNode
 
 from multiphi_exudyn.display import Shown, kinds, names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.state import Event
 from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
 from multiphi_exudyn.exudyn_plugin.solver import bodies_of
 from multiphi_exudyn.mechanics.arguments import no_text
 from multiphi_exudyn.mechanics.element import links_of
+from multiphi_exudyn.time.loaded_level import LoadedLevel
 from multiphi_exudyn.time.segments import force_row, patch_row, pressing_row
+from multiphi_exudyn.time.state import Event
 
 RECORDED = {
     "sCoordinates": exu.OutputVariableType.Coordinates,

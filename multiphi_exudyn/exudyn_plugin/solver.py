@@ -46,9 +46,8 @@ import exudyn.solver
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.exits import asked_state, exits_of, force_shares, signal_rows, state_of
 from multiphi_exudyn.exudyn_plugin.state import SAME_STEP, Coordinates
+from multiphi_exudyn.time.loaded_level import LoadedLevel
 from multiphi_exudyn.time.model_warnings import CALLER, issue
 
 RESIDUAL = 1e-7  # of its terms: a signal that is less negative is the residual of the solver's iterations
@@ -118,11 +117,11 @@ def static_changes(body: str, level: LoadedLevel, xi: np.ndarray, reactions: np.
     Raises MultiPhiValueError where friction would change its state, or slips at rest.
     """
     base, changes = level.level.base, []
-    for (element, exit_), row in zip(exits_of(level), signal_rows(level), strict=True):
-        shares = [share * reactions[link] for link, share in force_shares(level, element, exit_)]
-        terms = np.array([*(row.position * xi), row.constant, *shares])
+    for (element, exit_), (place, _, constant) in zip(level.exits, level.signals, strict=True):
+        shares = [share * reactions[link] for link, share in level.force_shares(element, exit_)]
+        terms = np.array([*(place * xi), constant, *shares])
         signal, size = float(np.sum(terms)), float(np.sum(np.abs(terms)))
-        comes_to_rest = exit_.asked == "stick" and state_of(level, element).event == "slip"
+        comes_to_rest = exit_.asked == "stick" and level.state_of(element).event == "slip"
         if signal >= -RESIDUAL * size and not (comes_to_rest and signal <= 0):
             continue
         if any(base.links[link].held for link in base.link_indices[element]):
@@ -131,7 +130,7 @@ def static_changes(body: str, level: LoadedLevel, xi: np.ndarray, reactions: np.
                 f"static solution of {body!r}: got forces that change the state of {name!r}, whose friction depends on "
                 "their path; need start=model.equilibrium({point: force}), or a damped run that comes to rest"
             )
-        changes.append(StaticChange(signal / size, element, asked_state(level, element, exit_)))
+        changes.append(StaticChange(signal / size, element, level.asked_state(element, exit_)))
     return changes
 
 

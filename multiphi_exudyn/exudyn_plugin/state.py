@@ -40,8 +40,6 @@ import exudyn as exu
 import numpy as np
 
 from multiphi_exudyn.display import per_cent
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.state import Loss, Phase, State
 from multiphi_exudyn.exudyn_plugin.attached import SystemMatrices
 from multiphi_exudyn.exudyn_plugin.discretised_level import SteppedLevel
 from multiphi_exudyn.exudyn_plugin.interface import Interface
@@ -50,7 +48,9 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.time.law_warnings import LawPlaces
+from multiphi_exudyn.time.loaded_level import LoadedLevel
 from multiphi_exudyn.time.run_warnings import RunSummary
+from multiphi_exudyn.time.state import Loss, Phase, State
 
 PHASES = tuple(Phase)
 ONE = np.ones(1)  # the entry 1 of x = (q, q', q'', 1, f)

@@ -39,15 +39,14 @@ from dataclasses import dataclass
 import numpy as np
 
 import multiphi_exudyn._core as core
-from multiphi_exudyn.events.excitation.excitation import Excitation
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.exits import exits_of, force_shares, signal_rows
-from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.transitions.state import Phase, Row, State
 from multiphi_exudyn.exudyn_plugin.discretised_level import SteppedLevel
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.piecewise_exponential import PiecewiseExponential
 from multiphi_exudyn.mechanics.loads import Load
+from multiphi_exudyn.time.excitation import Excitation
+from multiphi_exudyn.time.loaded_level import LoadedLevel
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
+from multiphi_exudyn.time.state import Phase, Row, State
 
 NEGLIGIBLE = float(np.finfo(float).eps)  # of a signal: smaller values count as zero
 FINER = 10.0  # smooth time functions of loads are approximated to a tenth of their tolerance
@@ -285,10 +284,10 @@ class OwnLoads:
 
     def _conditions(self, stepped: SteppedLevel, step: float, direct_reactions: np.ndarray) -> Conditions:
         level = self.loaded_levels.level(stepped.states)
-        rows = signal_rows(level)
+        rows = [Row(*signal) for signal in level.signals]
         reactions = np.zeros((len(rows), direct_reactions.shape[1]))
-        for k, (element, exit_) in enumerate(exits_of(level)):
-            for link, share in force_shares(level, element, exit_):
+        for k, (element, exit_) in enumerate(level.exits):
+            for link, share in level.force_shares(element, exit_):
                 reactions[k] += share * direct_reactions[link]
         return conditions_of(stepped, level, rows, step, reactions)
 
@@ -299,7 +298,7 @@ class OwnLoads:
         level, r, drive = self.loaded_levels.level(state.states), state.level.modal.modes, self.excitation.drive(time)
         parts = (state.displacement, drive.values[0]), (state.velocity, drive.values[1]), (state.reach, drive.sizes[0])
         xi, xi_t, reach = (np.concatenate([x[:r], w, x[r:]]) for x, w in parts)
-        signs = (row.sign(xi, xi_t, reach) for row in signal_rows(level))
+        signs = (row.sign(xi, xi_t, reach) for row in (Row(*signal) for signal in level.signals))
         signs_and_phases = zip(signs, state.phases, strict=True)
         return tuple(phase if sign <= 0 or phase is Phase.LANDING else Phase.ARMED for sign, phase in signs_and_phases)
 
@@ -307,7 +306,7 @@ class OwnLoads:
         """Modal forces (k, s) of channels w, w' (k, 2, q), in a level."""
         level, forces, q = self.loaded_levels.level(states), np.zeros((len(values), self._size)), values.shape[2]
         force, rate = level.channels.force[:, :q], level.channels.force_rate[:, :q]
-        drive_change = level.asymptotic.drive - level.alone.asymptotic.drive  # of the stepped level's constant force
+        drive_change = level.asymptotic.drive - level.asymptotic.static_drive  # of the stepped level's constant force
         forces[:, : level.modal.modes] = values[:, 0] @ force.T + values[:, 1] @ rate.T + drive_change
         return forces
 

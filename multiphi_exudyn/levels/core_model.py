@@ -47,20 +47,8 @@ def _made(model: MultiPhiModel) -> core.Model:
     elements = [_element(model, i) for i in range(len(model.contacts))]
     rough = np.array([_coefficients(element) for element in model.contacts]).reshape(-1, 2)
     return core.Model(
+        levels=model.modal_levels,
         elements=elements,
-        squares=base.squares,
-        damping=base.damping,
-        directions=base.directions.T,
-        force_directions=base.pushes.T,
-        gaps=base.gaps,
-        stiffnesses=base.stiffnesses,
-        dampings=base.dampings,
-        preload=base.preload,
-        energy_offset=base.energy_offset,
-        held=base.held,
-        oblique=list(base.oblique),
-        residual=list(model.residual),
-        general=base.general,
         roughest_first=np.lexsort((-rough[:, 0], -rough[:, 1])).tolist(),
         is_complete=model.whole,
         knots=sum(len(law.further) for law in base.laws.values()),

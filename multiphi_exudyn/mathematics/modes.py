@@ -15,7 +15,6 @@ round-off, which differs between processors. ``aligned_modes`` makes both unique
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,9 +35,7 @@ __all__ = [
     "NEAR",
     "ROUND_OFF",
     "Modes",
-    "aligned_clusters",
     "aligned_modes",
-    "cluster_end",
     "complete_modes",
     "first_shift",
     "indefinite",
@@ -58,7 +55,6 @@ SOFT = 1e-10  # round-off of omega^2 above which a mode is soft beside its strai
 ALONE = 0.5  # of omega^2 of the next mode: soft modes up to such a gap are made exact together
 REFINEMENTS = 3  # each squares the error that other modes leave in soft ones
 NEAR = 1e-6  # of omega^2: round-off mixes nearer modes by more than 1e-10, so they are kept together
-ROTATED = 1e-14  # of a coordinate's amplitude in a cluster: a smaller value after a rotation is round-off
 
 
 @dataclass(frozen=True)
@@ -184,55 +180,8 @@ def aligned_modes(
     these only, and so on; the omega^2 are replaced by their mean. The first row with a value in a mode has a positive
     one.
     """
-    squares, shapes = aligned_clusters(squares, shapes, rows, sizes)
-    signs = core.signs(shapes.T, rows, sizes)
-    return squares, shapes * signs, (rows @ shapes) * signs
-
-
-def aligned_clusters(
-    squares: np.ndarray, shapes: np.ndarray, rows: np.ndarray, sizes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return omega^2 and modes of ``aligned_modes``, with unique bases of clusters and any signs."""
-    clusters = core.clusters(squares)
-    if not clusters:
-        return squares, shapes
-    squares, shapes, values = squares.copy(), shapes.copy(), rows @ shapes
-    for first, last in clusters:
-        squares[first:last] = np.mean(squares[first:last])
-        rotation = _alignment(np.vstack([values[:, first:last], shapes[:, first:last]]), sizes)
-        lengths = np.linalg.norm(shapes[:, first:last], axis=1, keepdims=True)
-        cluster = shapes[:, first:last] @ rotation
-        shapes[:, first:last] = np.where(np.abs(cluster) <= ROTATED * lengths, 0.0, cluster)
-    return squares, shapes
-
-
-def cluster_end(squares: np.ndarray, count: int) -> int | None:
-    """Return the least number of modes >= ``count`` that parts no cluster; None where the last omega^2 (r,) are one.
-
-    squares: omega^2 [rad2/s2], ascending.
-    """
-    steps = enumerate(itertools.pairwise(squares[count - 1 :].tolist()), start=count)
-    return next((end for end, (lower, upper) in steps if upper - lower > NEAR * abs(upper)), None)
-
-
-def _alignment(values: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Return a rotation (d, d) of d modes after which each has its own first row; values: (k, d) of all rows."""
-    rotation = np.eye(values.shape[1])
-    for j in range(len(rotation) - 1):
-        rotated = values @ rotation[:, j:]
-        row = _first_row(np.linalg.norm(rotated, axis=1), sizes)
-        reflector = rotated[row] / (np.linalg.norm(rotated[row]) or 1.0)  # its mode comes first
-        reflector[0] += np.copysign(1.0, reflector[0])
-        rotation[:, j:] -= np.outer(rotation[:, j:] @ reflector, reflector) * (2 / (reflector @ reflector))
-    return rotation
-
-
-def _first_row(values: np.ndarray, sizes: np.ndarray) -> int:
-    """Return the first row with a value (k,), else the one of largest value."""
-    is_present = values > core.MOVES * sizes
-    if is_present.any():
-        return int(is_present.argmax())
-    return int(np.divide(values, sizes, out=np.zeros_like(values), where=sizes > 0).argmax())
+    squares, modes, values = core.aligned_modes(squares, shapes.T, rows, sizes)
+    return squares, np.ascontiguousarray(modes.T), values
 
 
 def _shifted_modes(mass: np.ndarray, stiffness: np.ndarray, shift: float) -> Modes | None:

@@ -14,7 +14,7 @@ __all__ = ["ResidualContact"]
 
 @dataclass(frozen=True, eq=False)
 class ResidualContact(UnilateralContact):
-    """A contact on a residual boundary (levels/level/residual_level.py): elastic, also where k is infinite.
+    """A contact on a residual boundary (core/residual_boundary.hpp): elastic, also where k is infinite.
 
     The modes left out have no inertia, so it takes no impact: where k is infinite its stiffness is theirs.
     """

@@ -26,12 +26,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.events.transitions.state import State
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.element import friction_spring
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.time.continuation import stop_displacements
 from multiphi_exudyn.time.simulate import Run
+from multiphi_exudyn.time.state import State
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["ATTRACTS", "PeriodMap", "Shooting"]

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import scipy.sparse
 
-from multiphi_exudyn.events.transitions.state import event_table
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping
 from multiphi_exudyn.mechanics.element import Element
@@ -23,6 +22,7 @@ from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
 from multiphi_exudyn.mechanics.structure import damping_matrix
 from multiphi_exudyn.mechanics.time_functions import Harmonic
 from multiphi_exudyn.study.given_motions import approximated, forces_at, stop_motion
+from multiphi_exudyn.time.state import event_table
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["NODES", "SHORTEST", "Inside", "JudgedRun"]

@@ -34,12 +34,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from multiphi_exudyn.events.transitions.state import event_table, total_loss
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.study.judged_run import BRIEF, FAR, NODES, SEGMENTS, Inside, JudgedRun
+from multiphi_exudyn.time.state import event_table, total_loss
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["broken_laws", "energy_rise", "lawful_rise"]

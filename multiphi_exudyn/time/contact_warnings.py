@@ -41,16 +41,15 @@ import scipy.optimize
 
 import multiphi_exudyn._core as core
 from multiphi_exudyn.display import per_cent
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.exits import signal_table, state_of
-from multiphi_exudyn.events.transitions.state import event_table
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.coulomb_impacts import CoulombImpact
 from multiphi_exudyn.mathematics.round_off import CLEAR, INDEPENDENT
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.element import friction_spring
+from multiphi_exudyn.time.loaded_level import LoadedLevel
 from multiphi_exudyn.time.record import Record
+from multiphi_exudyn.time.state import event_table
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["TOUCHING", "friction_warnings", "impact_warnings", "is_taking", "mesh_warnings", "spread_contacts"]
@@ -277,8 +276,9 @@ def _slip_row(element: int, sticks: int, level: LoadedLevel) -> np.ndarray:
     """s (h_t.x' - v_t - T'/k_t) [m/s] of an element while it slips, else zero; the level keeps it."""
     key = "slip", element
     if key not in level.entries:
-        slips, exit_ = level.states[element] > sticks, state_of(level, element).exits[0]
-        level.entries[key] = signal_table(level, [(element, exit_)])[0] if slips else np.zeros(2 * level.width + 1)
+        first = [i for i, _ in level.exits].index(element)
+        slips, (place, rate, constant) = level.states[element] > sticks, level.signals[first]
+        level.entries[key] = np.concatenate([place, rate, [constant]]) if slips else np.zeros(2 * level.width + 1)
     row: np.ndarray = level.entries[key]
     return row
 
@@ -373,7 +373,7 @@ def _impacts(trajectory: Trajectory) -> Iterator[_Impact]:
         rows = level.level.gap_rows[: len(rigid)]
         gaps[in_level], speeds[in_level] = (
             x[in_level, :n] @ rows.T + constants,
-            v[in_level, :n] @ level.level.speed_rows.T,
+            v[in_level, :n] @ level.speed_rows.T,
         )
         terms = np.abs(x[in_level, :n]) @ np.abs(rows).T + np.abs(constants)
         largest = np.maximum(largest, np.max(terms, axis=0, initial=0.0))

@@ -16,10 +16,10 @@ from dataclasses import replace
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.transitions.state import State
+from multiphi_exudyn.time.loaded_level import LoadedLevel
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
 from multiphi_exudyn.time.start import Start
+from multiphi_exudyn.time.state import State
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = ["continued_start", "stop_displacements", "with_final_velocity"]

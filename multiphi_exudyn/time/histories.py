@@ -15,10 +15,10 @@ import numpy as np
 
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.events.transitions.state import Event, total_impulse
 from multiphi_exudyn.mechanics.arguments import no_text
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.segments import Segment, Segments
+from multiphi_exudyn.time.state import Event, total_impulse
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,9 +14,9 @@ import numpy as np
 
 import multiphi_exudyn._core as core
 from multiphi_exudyn.display import Shown
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.state import Loss, State
+from multiphi_exudyn.time.loaded_level import LoadedLevel
 from multiphi_exudyn.time.record import PHASES, Record
+from multiphi_exudyn.time.state import Loss, State
 
 __all__ = ["NUMBERS", "FinalState", "Ledger", "Statistics", "ledger_of"]
 

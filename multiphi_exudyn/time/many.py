@@ -18,15 +18,14 @@ import numpy as np
 
 import multiphi_exudyn._core as core
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.events.excitation.excitation import Excitation
-from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.model.mode_choice import Tolerance, is_count
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mechanics.arguments import no_text, real_array
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.structure import At
-from multiphi_exudyn.time.core_levels import core_levels
+from multiphi_exudyn.time.excitation import Excitation
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
 from multiphi_exudyn.time.model_warnings import grouped, issue, row_warnings
 from multiphi_exudyn.time.motion import Motion, core_start, limits
 from multiphi_exudyn.time.segments import point_row
@@ -223,7 +222,7 @@ class Task:
                 waiting.append(number)
             except MultiPhiError as error:
                 self.results[number] = "failed", str(error), ()
-        built, window = core_levels(levels), limits(levels.model)
+        built, window = levels.in_core, limits(levels.model)
         given_starts = [core_start(levels, start) for start in starts]
         runs = core.run_batch(built, given_starts, *window, levels.drive.time, end, threads)
         largest = 0

@@ -15,14 +15,13 @@ import numpy as np
 
 import multiphi_exudyn._core as core
 from multiphi_exudyn.errors import MultiPhiError, NumericalFailure
-from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.transitions.state import Loss, State
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.force_law import ForceLaw
-from multiphi_exudyn.time.core_levels import core_levels
 from multiphi_exudyn.time.ledger import NUMBERS, Counts, FinalState
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
 from multiphi_exudyn.time.record import PHASES, Events, Record
 from multiphi_exudyn.time.start import Start
+from multiphi_exudyn.time.state import Loss, State
 from multiphi_exudyn.time.trajectory import Rerun, Trajectory
 
 __all__ = ["Motion", "core_start", "failure", "limits"]
@@ -44,7 +43,7 @@ class Motion:
         self.levels, self.start, self.model = levels, start, levels.model
         self.time, self.message = start.time, ""
         self._sums_works = sums_works
-        self._levels = core_levels(levels)
+        self._levels = levels.in_core
         self._run = self._new_run(start.time)
         if start.state is None:
             self._run.begin(core_start(levels, start))

@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 
 import multiphi_exudyn._core as core
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.transitions.state import Event, Loss, Phase
 from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mechanics.element import event_kind
-from multiphi_exudyn.time.core_levels import core_levels
+from multiphi_exudyn.time.loaded_level import LoadedLevel
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
 from multiphi_exudyn.time.segments import Segment, Segments
+from multiphi_exudyn.time.state import Event, Loss, Phase
 
 __all__ = ["PHASES", "Events", "Record"]
 
@@ -27,7 +26,7 @@ PHASES = (Phase.ARMED, Phase.RECOVERING, Phase.REFUSED, Phase.HELD_BACK, Phase.L
 
 
 class Record(Segments):
-    """Segments of ``trajectory`` so far, in levels that ``core_levels`` have built; the run may go on.
+    """Segments of ``trajectory`` so far, in levels of the core; the run may go on.
 
     loaded: the levels under the loads. levels: the visited ones. left_out: segments whose works the run has left out.
     truncation: what the run has lost by it (core/truncation.hpp).
@@ -49,7 +48,7 @@ class Record(Segments):
         return {"loaded": self.loaded, "trajectory": self.trajectory}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(state["loaded"], core_levels(state["loaded"]), state["trajectory"])  # type: ignore[misc]
+        self.__init__(state["loaded"], state["loaded"].in_core, state["trajectory"])  # type: ignore[misc]
 
     def __len__(self) -> int:
         return len(self.numbers)

@@ -72,8 +72,6 @@ from scipy.linalg.blas import dnrm2
 from multiphi_exudyn._core import OPEN_LEDGER as OPEN
 from multiphi_exudyn._core import lost_share
 from multiphi_exudyn.display import per_cent
-from multiphi_exudyn.events.excitation.excitation import Excitation
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.model.mode_choice import Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
@@ -84,8 +82,10 @@ from multiphi_exudyn.time.contact_warnings import (
     mesh_warnings,
     spread_contacts,
 )
+from multiphi_exudyn.time.excitation import Excitation
 from multiphi_exudyn.time.law_warnings import LawPlaces, approximated_laws, law_warnings, laws_at_an_end, span_warnings
 from multiphi_exudyn.time.ledger import Ledger
+from multiphi_exudyn.time.loaded_level import LoadedLevel
 from multiphi_exudyn.time.model_warnings import (
     advised,
     cluster_warnings,

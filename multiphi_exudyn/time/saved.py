@@ -34,14 +34,14 @@ import numpy as np
 
 from multiphi_exudyn.display import kinds
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.events.excitation.loaded_level import StrainForm
-from multiphi_exudyn.events.transitions.state import Event, Loss
 from multiphi_exudyn.files import write_whole
 from multiphi_exudyn.mathematics.exponentials import Exponentials
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.histories import Histories
 from multiphi_exudyn.time.ledger import Ledger, Statistics
+from multiphi_exudyn.time.loaded_level import StrainForm
 from multiphi_exudyn.time.segments import Segment, Segments
+from multiphi_exudyn.time.state import Event, Loss
 
 __all__ = [
     "KINDS",

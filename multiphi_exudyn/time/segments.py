@@ -23,10 +23,9 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.display import Shown
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.exits import state_of
-from multiphi_exudyn.events.transitions.state import Phase
 from multiphi_exudyn.mathematics.exponentials import Exponentials
+from multiphi_exudyn.time.loaded_level import LoadedLevel
+from multiphi_exudyn.time.state import Phase
 
 __all__ = ["Segment", "Segments", "force_row", "gap_row", "panels", "patch_row", "point_row", "pressing_row"]
 
@@ -216,7 +215,7 @@ def gap_row(element: int, level: LoadedLevel) -> np.ndarray:
 
 def force_row(element: int, level: LoadedLevel) -> np.ndarray:
     """Friction force T [N]."""
-    link, push = _held_link(level, element), state_of(level, element).push
+    link, push = _held_link(level, element), level.state_of(element).push
     if link in level.level.indices:
         row = -_link_row(level, link)
         row[-1] -= push

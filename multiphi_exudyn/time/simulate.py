@@ -18,8 +18,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.events.excitation.excitation import Excitation
-from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.model.mode_choice import Tolerance
 from multiphi_exudyn.levels.model.model import MultiPhiModel
@@ -28,6 +26,8 @@ from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.loads import Load, StopsMotion, patterns, unchanging
 from multiphi_exudyn.mechanics.time_functions import Harmonic, Smooth, Sweep
 from multiphi_exudyn.time.continuation import continued_start, with_final_velocity
+from multiphi_exudyn.time.excitation import Excitation
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
 from multiphi_exudyn.time.model_warnings import base_warnings, issue
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.run_warnings import warnings_of

@@ -11,15 +11,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.optimize
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.display import Shown
 from multiphi_exudyn.errors import MultiPhiValueError
-from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.transitions.state import State
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.round_off import INDEPENDENT, drop_round_off
 from multiphi_exudyn.mechanics.element import friction_spring
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
+from multiphi_exudyn.time.state import State
 
 __all__ = ["Start", "Starts"]
 
@@ -102,8 +104,8 @@ class Starts:
         jump = start.displacement - host.asymptotic.configuration - host.channels.shapes @ w
         xi = np.concatenate([host.modal.inertial.T @ jump, w])
         gaps = host.level.gap_rows @ xi + host.gap_constants
-        boundary = self.model.residual_boundary(host.level.indices)
-        pressed = boundary.pressed(gaps[list(self.model.residual)])
+        boundary = self.model.modal_levels.boundary(list(host.level.indices))
+        pressed = _pressing(self.model, boundary, gaps[list(self.model.residual)])
         states = tuple(CLOSED if i in pressed else state for i, state in enumerate(start.states))
         return replace(start, states=states, penetrating=tuple(sorted((*start.penetrating, *pressed))))
 
@@ -153,3 +155,15 @@ def _independent(model: MultiPhiModel, states: np.ndarray) -> np.ndarray:
             else:
                 states[i] = sticks + (SLIP_FORWARD if element.held else IDLE)
     return states
+
+
+def _pressing(model: MultiPhiModel, boundary: core.ResidualBoundary, gaps: np.ndarray) -> tuple[int, ...]:
+    """Links that press, f > 0, where the host has gaps (c,) [m]: f >= 0, (1/k + F) f + gaps >= 0."""
+    if not np.any(gaps < 0):
+        return ()
+    values, vectors = np.linalg.eigh(boundary.flexibility + np.diag(boundary.compliances))
+    resisting = values > INDEPENDENT * values[-1]
+    root = np.sqrt(values[resisting])[:, None] * vectors[:, resisting].T
+    aimed = -(vectors[:, resisting].T @ gaps) / np.sqrt(values[resisting])
+    forces, _ = scipy.optimize.nnls(root, aimed)
+    return tuple(link for link, force in zip(model.residual, forces.tolist(), strict=True) if force > 0)

@@ -20,9 +20,6 @@ import numpy as np
 
 from multiphi_exudyn.display import kinds, names
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.exits import exits_of
-from multiphi_exudyn.events.transitions.state import Event, Loss, Phase, State, event_table
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.contact import UnilateralContact
@@ -30,11 +27,13 @@ from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.histories import INSTANTS, Histories
 from multiphi_exudyn.time.ledger import FinalState, Ledger, Statistics, ledger_of
+from multiphi_exudyn.time.loaded_level import LoadedLevel
 from multiphi_exudyn.time.mesh_output import write_vtu
 from multiphi_exudyn.time.model_warnings import issue, row_warnings
 from multiphi_exudyn.time.saved import save
 from multiphi_exudyn.time.segments import Segments, force_row, gap_row, patch_row, point_row, pressing_row
 from multiphi_exudyn.time.start import Start
+from multiphi_exudyn.time.state import Event, Loss, Phase, State, event_table
 
 __all__ = ["ModelHistories", "Rerun", "Trajectory"]
 
@@ -311,7 +310,7 @@ class Trajectory(ModelHistories):
         i = self._contact("deepest_gap", contact)
         depth = 0.0
         for segment in self.segments:
-            exits = [k for k, (element, _) in enumerate(exits_of(segment.level)) if element == i]
+            exits = [k for k, (element, _) in enumerate(segment.level.exits) if element == i]
             unarmed = any(segment.phases[k] is not Phase.ARMED for k in exits)
             if unarmed and set(self.model.pressing_links(i)).isdisjoint(segment.level.level.indices):
                 depth = min(depth, float(np.min(segment.gaps(i, segment.unarmed_times(samples)))))

@@ -23,7 +23,7 @@ difference to the truncated state after it is the defect
 
 in the displacement norm of the mass matrix: w / Omega is the displacement that a lost velocity would have become in the
 open level, to which it comes back. At the start it is the static residual of the starting configuration. From level to
-level d and w / Omega are linear in the state before and in the changes beside the map of the levels (defect_forms.py);
+level d and w / Omega are linear in the state before and in the changes beside the map of the levels (core/defect_form.hpp);
 the triangular factors of these maps are kept, a few numbers per pair of levels.
 """
 
@@ -41,15 +41,15 @@ import multiphi_exudyn._core as core
 from multiphi_exudyn._core import indicator
 from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.errors import MultiPhiTypeError
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.defect_forms import allowed, defect_form, held_rigidly, over_omega
-from multiphi_exudyn.events.transitions.state import event_table
-from multiphi_exudyn.events.transitions.transition import Transition
+from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.model.mode_choice import TRIED, Tolerance, UpTo
 from multiphi_exudyn.levels.model.model import MultiPhiModel
+from multiphi_exudyn.mathematics.orthonormal import without
+from multiphi_exudyn.time.loaded_level import LoadedLevel
 from multiphi_exudyn.time.model_warnings import REMEDY
 from multiphi_exudyn.time.record import Record
+from multiphi_exudyn.time.state import event_table
 from multiphi_exudyn.time.trajectory import Trajectory
 
 __all__ = [
@@ -273,8 +273,8 @@ class DefectHistory:
         squares[0] = _at_start(trajectory, segments.levels[segments.numbers[0]], stopped.get(0, ()), first[:, 0])
         for (before, after_it, struck), places in transitions.items():
             rows = np.searchsorted(entered, places)
-            form = defect_form(Transition(segments.levels[before], segments.levels[after_it]), struck)
-            squares[rows] = form.squares(last[:, rows - 1], first[:, rows])
+            source, target = segments.levels[before], segments.levels[after_it]
+            squares[rows] = _squares(source, target, struck, last[:, rows - 1], first[:, rows])
         return cls(segments, entered, squares)
 
     def indicator(self, end: float) -> float:
@@ -289,13 +289,34 @@ def total_defect(trajectory: Trajectory) -> float:
     return float(np.sum(DefectHistory.of(trajectory).squares)) if math.isnan(summed) else summed
 
 
+def _squares(
+    source: LoadedLevel, target: LoadedLevel, stopped: tuple[int, ...], before: np.ndarray, after: np.ndarray
+) -> np.ndarray:
+    """|defect|^2 (k,) between states (2, k, >= n) before and after an instant."""
+    transition = core.Transition(source.of_core, target.of_core)
+    form = core.DefectForm(transition, list(stopped))
+    n_after, n = transition.matrix.shape
+    (x, v), (x_after, v_after) = before[:, :, :n], after[:, :, :n_after]
+    changed = x @ transition.matrix.T + transition.offset - x_after
+    slowed = v @ transition.velocity_matrix.T - v_after
+    d = form.displaced[:, 0] + np.hstack([x, changed]) @ form.displaced[:, 1:].T
+    w = np.hstack([v, slowed]) @ form.moving.T
+    return np.asarray(np.sum(d * d, axis=1) + np.sum(w * w, axis=1))
+
+
+def _allowed(base: ModalBase, held: set[int], motion: np.ndarray) -> np.ndarray:
+    """The part of a motion (m,) that rigid contacts allow."""
+    return without(base.directions[:, sorted(held)], motion) if held else motion
+
+
 def _at_start(trajectory: Trajectory, level: LoadedLevel, stopped: tuple[int, ...], state: np.ndarray) -> float:
     """|defect|^2 [m2 kg] of the start; state: xi, xi' (2, >= r) of the first segment."""
-    base, rigid, r = level.level.base, held_rigidly(level), level.level.modes
+    base, r = level.level.base, level.level.modes
+    rigid = {i for i in level.level.indices if base.links[i].rigid}
     start = trajectory.start
-    d = allowed(base, rigid, start.displacement - level.configuration(state[0, :r]))
-    v = allowed(base, rigid | set(stopped), start.velocity - level.level.vectors @ state[1, :r])
-    w = over_omega(base, v)
+    d = _allowed(base, rigid, start.displacement - level.configuration(state[0, :r]))
+    v = _allowed(base, rigid | set(stopped), start.velocity - level.level.vectors @ state[1, :r])
+    w = v * base.periods
     return float(d @ d + w @ w)
 
 

@@ -11,10 +11,9 @@ from small_structures import chain
 
 import multiphi_exudyn as mp
 import multiphi_exudyn._core as core
-from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
 from multiphi_exudyn.exudyn_plugin.interface import _direct_reactions
 from multiphi_exudyn.levels.core_model import core_model
-from multiphi_exudyn.time.core_levels import core_excitation, core_levels, level_data
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
 
 STRUCTURE = chain(3, damping=mp.ModalDamping([0.02, 0.01, 0.03]), stiffness=10.0)
 STOP = mp.UnilateralContact("stop", "m2", 0.1, 50.0)
@@ -33,7 +32,7 @@ def model_of(case):
 
 def held_levels(model):
     levels = LoadedLevels.static(model, np.zeros(model.base.modes.count))
-    return core.HeldLevels(core_model(model), core_excitation(levels), lambda states: level_data(levels.level(states)))
+    return core.HeldLevels(core_model(model), levels.core_excitation())
 
 
 def forces(model, point, force):
@@ -56,7 +55,7 @@ def keys_of(model):
 def test_a_held_force_is_a_load(case, point):
     model = model_of(case)
     load = model.base.modes.shapes.T @ STRUCTURE.row(point) * FORCE
-    loaded, held = core_levels(LoadedLevels.static(model, load)), held_levels(model)
+    loaded, held = LoadedLevels.static(model, load).in_core, held_levels(model)
     for earlier in (-3.0, FORCE):  # only the forces that were set last count
         held.set_forces(forces(model, point, earlier))
         for key in keys_of(model):
@@ -82,7 +81,7 @@ def test_a_held_force_is_a_load(case, point):
 @pytest.mark.parametrize("case", CASES)
 def test_without_forces_and_inertia_they_are_the_plain_levels_again(case):
     model = model_of(case)
-    plain, held = core_levels(LoadedLevels.static(model, np.zeros(model.base.modes.count))), held_levels(model)
+    plain, held = LoadedLevels.static(model, np.zeros(model.base.modes.count)).in_core, held_levels(model)
     keys = keys_of(model)
     inertia = (
         lambda states: 0.5 * np.eye(model.level_at(model.active_links(states)).modes),

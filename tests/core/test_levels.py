@@ -1,27 +1,23 @@
 """Levels, transitions, energies and inputs of the core are what matrices and functions say, of scenes of all kinds."""
 
 import functools
-import gc
 import itertools
 import math
 import pickle
-import weakref
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from campaign_scenes import KINDS, scene_of
+from numpy.testing import assert_array_equal
 
 from multiphi_exudyn import MultiPhiError
 from multiphi_exudyn import _core as core
 from multiphi_exudyn.errors import NumericalFailure
-from multiphi_exudyn.events.excitation.excitation import Excitation
-from multiphi_exudyn.events.transitions.defect_forms import allowed, held_rigidly, over_omega
-from multiphi_exudyn.events.transitions.exits import asked_state, exits_of, signal_table
-from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
-from multiphi_exudyn.events.transitions.transition import Transition
 from multiphi_exudyn.levels.core_model import RULES, core_model
-from multiphi_exudyn.time.core_levels import core_excitation, core_levels, level_data
+from multiphi_exudyn.mathematics.orthonormal import without
+from multiphi_exudyn.time.excitation import Excitation
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
 
 ROUND_OFF = 1e-12  # of the size of the terms
 NUMBERS = range(2)  # scenes of every kind
@@ -57,7 +53,7 @@ def case_of(kind, number):
     excitation = Excitation.of(model, scene.loads, scene.t_end)
     levels = LoadedLevels.under(model, excitation, 0.0, scene.t_end, lasting=scene.t_end)
     random = np.random.default_rng([number, *kind.encode()])
-    return Case(levels, core_levels(levels), _keys(levels, random), random)
+    return Case(levels, levels.in_core, _keys(levels, random), random)
 
 
 def _keys(levels, random):
@@ -100,29 +96,35 @@ class TestLevel:
             modal, r, n = loaded.modal, level.modes, level.modes + level.channels
             assert level.key == key
             assert (r, n) == (modal.modes, loaded.width)
-            stiffness = np.diag(modal.squares) + (0.0 if modal.coupling is None else modal.coupling)
+            stiffness = np.diag(modal.squares) + modal.coupling
             near(level.displacement_acceleration, np.hstack([-stiffness, loaded.channels.force]))
             near(level.velocity_acceleration, np.hstack([-modal.damping_matrix, loaded.channels.force_rate]))
             near(level.omega[modal.squares > 0], np.sqrt(modal.squares[modal.squares > 0]))
             assert level.drives_free_modes == loaded.driven
 
-    def test_has_gaps(self, case):
+    def test_has_the_gaps_of_its_configuration(self, case):
+        """h.y + gap - s w of every link, y = Psi eta + y_inf + R w."""
         for key in case.keys:
-            level, loaded = case.core.level(key), case.levels.level(key)
-            near(level.gap_rows, loaded.level.gap_rows)
-            near(level.gap_constants, loaded.gap_constants)
+            level, base = case.core.level(key), case.levels.model.base
+            shapes = np.hstack([level.shapes, level.channel_shapes])
+            stops = np.hstack([np.zeros((len(base.links), level.modes)), case.levels.excitation.stops])
+            sizes = np.abs(base.directions.T) @ np.abs(shapes) + np.abs(stops)
+            near(level.gap_rows, base.directions.T @ shapes - stops, np.max(sizes, initial=1.0))
+            rest = np.abs(base.directions.T) @ np.abs(level.configuration) + np.abs(base.gaps)
+            near(level.gap_constants, base.gaps_at(level.configuration, base.gaps), 10 * np.max(rest, initial=0.0))
 
     def test_has_guards(self, case):
         for key in case.keys:
             level, loaded = case.core.level(key), case.levels.level(key)
-            exits, n = exits_of(loaded), loaded.width
+            exits = loaded.exits
             assert len(level.guards) == len(exits)
-            for guard, (i, exit_), row in zip(level.guards, exits, signal_table(loaded, exits), strict=True):
-                assert (guard.element, guard.target) == (i, asked_state(loaded, i, exit_))
+            for guard, (i, exit_) in zip(level.guards, exits, strict=True):
+                assert (guard.element, guard.target) == (i, loaded.asked_state(i, exit_))
+                position, rate, constant = _signal(loaded, i, exit_)
                 assert guard.rule == RULES[exit_.firmness]
-                near(guard.signal.displacement, row[:n])
-                near(guard.signal.velocity, row[n:-1])
-                near(guard.signal.constant, row[-1], np.max(np.abs(row), initial=0.0))
+                near(guard.signal.displacement, position)
+                near(guard.signal.velocity, rate)
+                near(guard.signal.constant, sum(constant), np.max(np.abs([*position, *constant]), initial=0.0))
                 assert (guard.by_velocity is None) == (exit_.turn is None)
             firsts = [sum(element < i for element, _ in exits) for i in range(len(key))]
             assert [level.first_guard(i) for i in range(len(key))] == firsts
@@ -131,19 +133,41 @@ class TestLevel:
         """|w / Omega|^2 of a unit impulse: V V^T h, without its part along h and along what closed contacts prevent."""
         for key in case.keys:
             level, loaded = case.core.level(key), case.levels.level(key)
-            base, modes, held = loaded.level.base, loaded.modal.vectors, held_rigidly(loaded)
+            base, modes = loaded.level.base, loaded.modal.vectors
+            held = [k for k in loaded.level.indices if base.links[k].rigid]
             rough = any(element.further or element.held for element in base.contacts)
             for i, element in enumerate(base.contacts):
                 if not element.rigid or rough:
                     assert np.isnan(level.struck_defects[i])
                     continue
                 given = base.directions[:, [i]]
-                moved = allowed(base, held, modes @ (modes.T @ given))
-                across = allowed(base, held, given)
+                moved = _allowed(base, held, modes @ (modes.T @ given))
+                across = _allowed(base, held, given)
                 if np.any(across):
                     moved = moved - across * (np.sum(across * moved) / np.sum(across**2))
                 size = (np.linalg.norm(given) * np.max(base.periods, initial=0.0)) ** 2
-                near(level.struck_defects[i], np.sum(over_omega(base, moved) ** 2), size)
+                near(level.struck_defects[i], np.sum((base.periods[:, None] * moved) ** 2), size)
+
+
+def _signal(loaded, element, exit_):
+    """Rows (n,) of xi and xi' and the constant terms of s = gap q + rate q' + force lambda + constant."""
+    own, links = loaded.level, loaded.base.link_indices[element]
+    position, rate, constants = np.zeros(loaded.width), np.zeros(loaded.width), [exit_.constant]
+    for share in exit_.shares:
+        link = links[share.link]
+        position += share.gap * own.gap_rows[link]
+        rate += share.rate * own.gap_rows[link]
+        constants.append(share.gap * loaded.gap_constants[link])
+        if share.force:
+            k = own.indices.index(link)
+            position += share.force * own.force_rows[k]
+            rate += share.force * own.force_rate_rows[k]
+            constants.append(share.force * loaded.asymptotic.forces[k])
+    return position, rate, constants
+
+
+def _allowed(base, held, motion):
+    return without(base.directions[:, held], motion) if held else motion
 
 
 class TestEnergies:
@@ -217,19 +241,42 @@ class TestTransition:
     def test_between_levels(self, case):
         for source, target in case.pairs():
             got = case.core.transition(case.core.level(source), case.core.level(target))
-            wanted = Transition(case.levels.level(source), case.levels.level(target))
-            here, there = wanted.source, wanted.target
+            here, there = case.levels.level(source), case.levels.level(target)
             rest = np.abs(here.asymptotic.configuration) + np.abs(there.asymptotic.configuration)
             terms = got.terms
             assert (terms is None) == (here.excitation.channels == here.excitation.prescribed)
             size = 0.0 if terms is None else np.max(terms[:, :-1], initial=0.0)
             matrix_sizes = np.abs(there.modal.vectors.T) @ (np.abs(here.level.vectors) + 1.0)
             sizes = np.maximum(size, np.max(matrix_sizes, initial=1.0))
-            near(got.matrix, wanted.matrix, sizes)
-            near(got.velocity_matrix, wanted.velocity_matrix, sizes)
-            offset = np.max(np.abs(there.modal.vectors.T) @ rest, initial=0.0)
-            near(got.offset, wanted.offset, offset if terms is None else np.max(terms[:, -1], initial=offset))
+            projected, (r, before) = there.modal.vectors.T, (there.modal.modes, here.modal.modes)
+            carried = here.channels.carried - there.channels.carried
+            near(got.velocity_matrix[:r], np.hstack([projected @ here.modal.vectors, projected @ carried]), sizes)
+            near(got.velocity_matrix[r:], np.eye(carried.shape[1], here.width, before))
+            set_by = got.matrix[r:] - got.velocity_matrix[r:]  # places that links begin to hold
+            moved = np.hstack([here.modal.vectors, here.channels.shapes - there.channels.shapes])
+            near(got.matrix[:r], projected @ (moved - there.channels.shapes @ set_by), sizes)
+            offset = np.max(np.abs(projected) @ rest, initial=0.0)
+            jump = here.asymptotic.configuration - there.asymptotic.configuration
+            jump = jump - there.channels.shapes @ got.offset[r:]
+            near(got.offset[:r], projected @ jump, offset if terms is None else np.max(terms[:, -1], initial=offset))
+            self.check_held(case, here, there, got)
             assert got.start_sizes.size == 0
+
+    def check_held(self, case, here, there, got):
+        """Where a link begins to hold, its stretch q in the new level is the one that the state before defines."""
+        base, r = case.levels.model.base, there.modal.modes
+        for k, link in enumerate(base.held):
+            element = next(i for i, links in enumerate(base.link_indices) if link in links)
+            row = r + here.excitation.prescribed + k
+            if (link in there.modal.indices) and (link not in here.modal.indices):
+                stretch, constant = here.stretch(element)
+                place, offset = got.matrix[row], got.offset[row]
+                held = np.zeros(here.width)
+                held[here.modal.modes + here.excitation.prescribed + k] = 1.0
+                near(here.level.gap_rows[link] + held - place, stretch, np.max(np.abs(place)))
+                near(here.gap_constants[link] - offset, constant, np.abs(offset) + np.abs(constant))
+            else:
+                assert not np.any(got.offset[row])
 
     def test_from_the_base(self, case):
         """eta = Psi^T (y - y_inf - R w), eta' = Psi^T (y' - Y w'); channels stay what they are."""
@@ -248,7 +295,7 @@ class TestTransition:
 
 class TestInputs:
     def test_at_any_time(self, case):
-        excitation, drive = core_excitation(case.levels), case.levels.excitation.drive
+        excitation, drive = case.levels.core_excitation(), case.levels.excitation.drive
         inputs, q = core.Inputs(excitation), excitation.prescribed
         end = case.levels.until if q else 1.0
         for time in [0.0, *np.sort(case.random.uniform(0, end, 5)), np.nextafter(end, 0)]:
@@ -263,7 +310,7 @@ class TestInputs:
                 near(got, given.sizes[k])
 
     def test_moved_on(self, case):
-        excitation, drive = core_excitation(case.levels), case.levels.excitation.drive
+        excitation, drive = case.levels.core_excitation(), case.levels.excitation.drive
         inputs, end = core.Inputs(excitation), case.levels.until if excitation.prescribed else 1.0
         inputs.set(0, 0.0, 0.0, end)
         until = min(end, inputs.interval_end)
@@ -283,48 +330,24 @@ class TestLevels:
         return LoadedLevels.under(scene.model, Excitation.of(scene.model, (), 1.0), 0.0, 1.0)
 
     def test_are_built_once(self):
-        levels, asked = self.levels(), []
-
-        def build(states):
-            asked.append(states)
-            return level_data(levels.level(states))
-
-        made = core.Levels(core_model(levels.model), core_excitation(levels), build)
-        key = (0,) * len(levels.model.contacts)
-        first = made.level(key)
-        assert made.level(key) is first
-        assert asked == [key]
-        assert made.bytes > first.bytes / 2
-
-    def test_pass_on_what_their_builder_raises(self):
         levels = self.levels()
+        key = (0,) * len(levels.model.contacts)
+        first = levels.in_core.level(key)
+        assert levels.in_core.level(key) is first
+        assert levels.model.levels_built == 1
+        assert levels.in_core.bytes > first.bytes / 2
 
-        def build(states):
-            raise NumericalFailure("no such level")
-
-        made = core.Levels(core_model(levels.model), core_excitation(levels), build)
-        with pytest.raises(NumericalFailure, match="no such level"):
-            made.level((0,) * len(levels.model.contacts))
-
-    def test_are_freed_with_the_object_that_they_are_built_by(self):
-        class Owner:
-            def __init__(self, levels):
-                self.levels = levels
-                self.core = core.Levels(core_model(levels.model), core_excitation(levels), self.build)
-
-            def build(self, states):
-                return level_data(self.levels.level(states))
-
-        owner = Owner(self.levels())
-        owner.core.level((0,) * len(owner.levels.model.contacts))
-        alive = weakref.ref(owner)
-        del owner
-        gc.collect()
-        assert alive() is None
+    def test_under_other_loads_share_what_does_not_depend_on_them(self):
+        levels = self.levels()
+        key = (0,) * len(levels.model.contacts)
+        levels.in_core.level(key)
+        other = LoadedLevels.static(levels.model, np.ones(levels.model.base.modes.count))
+        assert_array_equal(other.in_core.level(key).shapes, levels.in_core.level(key).shapes)
+        assert levels.model.levels_built == 1
 
     def test_are_forgotten_but_one(self):
         levels = self.levels()
-        made, count = core_levels(levels), len(levels.model.contacts)
+        made, count = levels.in_core, len(levels.model.contacts)
         kept, other = made.level((0,) * count), made.level((1,) + (0,) * (count - 1))
         made.transition(kept, other)
         before = made.bytes

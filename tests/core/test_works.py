@@ -10,7 +10,6 @@ from small_structures import chain, oscillator
 
 import multiphi_exudyn as mp
 from multiphi_exudyn import _core as core
-from multiphi_exudyn.time.core_levels import core_levels
 from multiphi_exudyn.time.motion import limits
 from multiphi_exudyn.time.simulate import Run
 
@@ -48,7 +47,7 @@ LOADS = {
 def run_of(model, t_end, displacement=None, velocity=None, loads=()):
     """The core's levels and the trajectory of its run."""
     motion = Run(model, t_end, displacement, velocity, loads)._motion()
-    start, levels = motion.start, core_levels(motion.levels)
+    start, levels = motion.start, motion.levels.in_core
     run = core.Run(levels, *limits(motion.model), start.time)
     run.begin(core.Start(start.displacement, start.velocity, start.held, list(start.states), 0.0))
     assert run.advance(t_end) is None

@@ -14,8 +14,8 @@ from small_structures import chain, random_model, stop
 
 import multiphi_exudyn as mp
 import multiphi_exudyn._core as core
-from multiphi_exudyn.events.transitions.state import event_table
 from multiphi_exudyn.time.run_warnings import warnings_of
+from multiphi_exudyn.time.state import event_table
 from multiphi_exudyn.time.truncation import defects
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
 

@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 from small_structures import chain, random_model
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.excitation.excitation import Excitation
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
+from multiphi_exudyn.time.excitation import Excitation
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
 
 TIMES = np.linspace(0.0, 20.0, 101)
 PLACE = np.eye(3)[1]
@@ -150,8 +150,9 @@ class TestQuasiStaticCorrection:
 
 def driven(model, closed, load):
     """A level under a load that varies, and what of xi = (eta, w) it is at rest in while w = 1."""
-    static = LoadedLevel.of(model.level(closed), np.zeros(model.base.modes.count))
-    level = static.under(Excitation.of(model, [load], 1.0))
+    levels = LoadedLevels.under(model, Excitation.of(model, [load], 1.0), 0.0, 1.0)
+    states = [int(contact.name in closed) for contact in model.contacts]
+    static, level = levels.alone.level(states), levels.level(states)
     return level, np.concatenate(
         [level.channels.force[:, 0] / static.level.squares, np.eye(level.excitation.channels)[0]]
     )

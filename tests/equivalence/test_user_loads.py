@@ -8,8 +8,7 @@ from integrated import integrated
 from small_structures import chain
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.excitation import excitation
-from multiphi_exudyn.time import run_warnings
+from multiphi_exudyn.time import excitation, run_warnings
 
 TIMES = np.linspace(0.0, 2.0, 81)
 STOPS = (mp.UnilateralContact("below", "m2", 0.02, 500.0), mp.UnilateralContact("above", {"m0": -1.0}, 0.03, 300.0))

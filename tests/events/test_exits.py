@@ -8,8 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.transitions.exits import exits_of, signal_table
-from multiphi_exudyn.events.transitions.loaded_levels import LoadedLevels
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
 
 K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])
 ELEMENTS = [
@@ -31,21 +30,22 @@ def test_signals_are_made_of_gaps_their_rates_and_forces(states):
     forces = dict(
         zip(own.indices, own.force_rows @ xi + own.force_rate_rows @ xi_t + level.asymptotic.forces, strict=True)
     )
-    exits = exits_of(level)
+    exits = level.exits
     assert [(i, exit_.asked) for i, exit_ in exits] == [
         (i, exit_.asked) for i, state in enumerate(states) for exit_ in ELEMENTS[i].states[state].exits
     ]
-    for (i, exit_), row in zip(exits, signal_table(level, exits), strict=True):
+    for (i, exit_), (place, rate, constant) in zip(exits, level.signals, strict=True):
         parts = [(links[i][share.link], share) for share in exit_.shares]
         terms = [exit_.constant, *(share.gap * gaps[k] + share.rate * rates[k] for k, share in parts)]
         terms += [share.force * forces[k] for k, share in parts if share.force]
-        assert_allclose(row @ np.concatenate([xi, xi_t, [1.0]]), sum(terms), rtol=0, atol=1e-12 * sum(map(abs, terms)))
+        found = place @ xi + rate @ xi_t + constant
+        assert_allclose(found, sum(terms), rtol=0, atol=1e-12 * sum(map(abs, terms)))
 
 
 def test_a_limit_that_equals_the_load_but_for_round_off_is_reached():
     structure = mp.LinearStructure(np.eye(2), 4e4 * np.array([[2, -1], [-1, 1]]), points={"tip": 1, "mid": 0})
     model = mp.MultiPhiModel(structure, [mp.Friction("ring", "tip", 0.3)], modes="all")
     level = LoadedLevels.static(model, model.base_load({"tip": 0.1 + 0.2})).level((0,))
-    signals = signal_table(level, exits_of(level))
-    assert signals[0, -1] == 0.0
-    assert_allclose(signals[1, -1], 0.6, rtol=1e-15)
+    (*_, lower), (*_, upper) = level.signals
+    assert lower == 0.0
+    assert_allclose(upper, 0.6, rtol=1e-15)

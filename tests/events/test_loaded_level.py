@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 from small_structures import chain, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.excitation.excitation import Excitation
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.transition import Transition
+import multiphi_exudyn._core as core
+from multiphi_exudyn.time.excitation import Excitation
+from multiphi_exudyn.time.loaded_levels import LoadedLevels
 
 STOPS = (stop("m1", 0.2), stop("m4", 0.1, 30.0, "soft"), stop("m2", 0.1, 20.0, "law"))
 LOADS = (
@@ -29,9 +29,10 @@ def model(overrides=None, modes=4):
 def with_and_without(m, closed, loads=LOADS):
     """A level under a static load alone, and under loads that vary as well."""
     load = m.base.modes.shapes.T @ np.array([0.0, -1.0, 0.5, 0.0, 2.0])
-    alone = LoadedLevel.of(m.level(closed), load)
-    varying = Excitation.of(m, loads, 1.0)
-    return alone, alone.under(dataclasses.replace(varying, static=load))
+    varying = dataclasses.replace(Excitation.of(m, loads, 1.0), static=load)
+    states = [int(contact.name in closed) for contact in m.contacts]
+    levels = LoadedLevels.under(m, varying, 0.0, 1.0)
+    return levels.alone.level(states), levels.level(states)
 
 
 @pytest.mark.parametrize("overrides", [None, GIVEN], ids=["computed", "given"])
@@ -54,7 +55,7 @@ class TestWhileNothingVaries:
         m = model(overrides)
         others = with_and_without(m, ("soft",))
         for other, level in zip(others, with_and_without(m, closed), strict=True):
-            move, r, s = Transition(other, level), level.modal.modes, other.modal.modes
+            move, r, s = core.Transition(other.of_core, level.of_core), level.modal.modes, other.modal.modes
             assert_allclose(move.matrix[:r, :s], level.modal.vectors.T @ other.modal.vectors, atol=1e-13)
             assert_allclose(move.matrix[r:], np.eye(len(move.matrix) - r, len(move.matrix[0]), s), atol=0)
 
@@ -77,17 +78,9 @@ def test_energies_in_xi_are_those_of_the_configuration(closed, modes):
 
 def test_the_strain_of_a_stop_that_moves_far_is_no_difference_of_large_energies():
     m = mp.MultiPhiModel(chain(1, stiffness=1e-6), [stop("m0", 0.0, 1e8, "soft")], "all")
-    level = LoadedLevel.of(m.level(("soft",)), np.zeros(1)).under(
-        Excitation.of(m, [mp.StopMotion("soft", mp.Harmonic(1.0, 1.0))], 1.0)
+    level = LoadedLevels.under(m, Excitation.of(m, [mp.StopMotion("soft", mp.Harmonic(1.0, 1.0))], 1.0), 0, 1).level(
+        [1]
     )
     vector, shown = level.level.vectors[0]
     xi = np.array([(1.0 - 1e-4 - shown) / vector, 1.0])  # 0.1 mm inside a stop that has moved by 1 m
     assert_allclose(level.strain(xi), 0.5 * 1e8 * 1e-8 + 0.5 * level.level.base.modes.omega[0] ** 2, rtol=1e-9)
-
-
-def test_levels_of_other_histories_share_what_is_kept():
-    m = model()
-    alone, level = with_and_without(m, ("soft",))
-    again = alone.under(dataclasses.replace(Excitation.of(m, LOADS, 2.0), static=level.excitation.static))
-    assert again.level is level.level
-    assert again.entries is level.entries

@@ -57,7 +57,7 @@ def _dissipation(level, xi_t):
 def _dampers(level, xi_t):
     """c g' (k, times) [N] of the closed contacts: the forces of their dampers."""
     index = list(level.level.indices)
-    return np.asarray(level.level.base.dampings[index][:, None] * (level.level.speed_rows[index] @ xi_t))
+    return np.asarray(level.level.base.dampings[index][:, None] * (level.speed_rows[index] @ xi_t))
 
 
 def _power(level, xi, xi_t, xi_tt):

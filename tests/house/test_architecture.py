@@ -147,10 +147,10 @@ BREACHES = {
     "a later room within one": ("study.scene_tables", "from multiphi_exudyn.study import runs"),
     "what stands beside": ("time.simulate", "import reference_models.rig"),
     "for a type checker": ("levels.level.level", "if TYPE_CHECKING:\n    from multiphi_exudyn.levels import model"),
-    "inside a function": ("levels.level.level", "def f():\n    from multiphi_exudyn.events import exits"),
-    "by a string": ("levels.level.level", "importlib.import_module('multiphi_exudyn.events.transitions.exits').after"),
-    "by a string alone": ("levels.level.level", "f = import_module('multiphi_exudyn.events.transitions.exits')"),
-    "by the built-in": ("levels.level.level", "__import__('multiphi_exudyn.events.transitions.exits')"),
+    "inside a function": ("levels.level.level", "def f():\n    from multiphi_exudyn.time import excitation"),
+    "by a string": ("levels.level.level", "importlib.import_module('multiphi_exudyn.time.excitation').after"),
+    "by a string alone": ("levels.level.level", "f = import_module('multiphi_exudyn.time.excitation')"),
+    "by the built-in": ("levels.level.level", "__import__('multiphi_exudyn.time.excitation')"),
 }
 
 

@@ -109,7 +109,8 @@ def test_a_docstring_is_complete(name):
     assert all(content.strip() for content in found.values())
     assert all(is_error(getattr(mp, error, None)) for error in named(found.get("Raises", "")))
     if of_results:
-        fields = {field.name for field in dataclasses.fields(thing) if not field.name.startswith("_")}
+        listed = dataclasses.fields(thing) if dataclasses.is_dataclass(thing) else ()
+        fields = {field.name for field in listed if not field.name.startswith("_")}
         assert fields <= set(named(found["Attributes"]))
     elif not is_error(thing):
         assert named(found["Parameters"]) == parameters(thing)

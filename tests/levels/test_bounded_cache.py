@@ -11,7 +11,7 @@ from small_structures import bed, chain, stop
 from multiphi_exudyn import ConstantLoad, HarmonicLoad, MultiPhiModel, simulate
 from multiphi_exudyn.levels.model import level_store
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.time import core_levels
+from multiphi_exudyn.time import loaded_levels
 
 TIMES = np.linspace(0.0, 0.04, 40)
 
@@ -72,9 +72,9 @@ def test_levels_of_the_core_are_kept_up_to_a_bound(monkeypatch):
     model, runs, cores = bed(1e7, n=60, stops=8, modes=8), [], []
     velocity = model.level(()).shapes[:, :4] @ [-6.0, 5.0, -9.0, 4.0]
     for bound in (2**29, 2**29, 0):
-        monkeypatch.setattr(core_levels, "MOST_BYTES", bound)
+        monkeypatch.setattr(loaded_levels, "MOST_BYTES", bound)
         runs.append(simulate(model, float(TIMES[-1]), velocity=velocity, loads=[ConstantLoad("p3", 1.0)]))
-        cores.append([levels.core for _, levels in model.loaded.items() if levels.core is not None][-1])
+        cores.append(runs[-1].ending.record.core_levels)
     assert cores[0] is cores[1]
     assert cores[2] is not cores[1]
     assert told(runs[0]) == told(runs[1]) == told(runs[2])

@@ -60,7 +60,7 @@ class TestMultiPhiModel:
         assert m.levels_built == 1
 
     @pytest.mark.parametrize("modes", [3, "all"])
-    def test_another_number_of_modes_builds_nothing_anew(self, modes, monkeypatch):
+    def test_another_number_of_modes_builds_no_other_base(self, modes, monkeypatch):
         m = MultiPhiModel(chain(6), [stop()], modes=2)
         m.level(("stop",))
 
@@ -68,7 +68,6 @@ class TestMultiPhiModel:
             raise AssertionError("built anew")
 
         monkeypatch.setattr(multiphi_exudyn.levels.model.level_store, "build_base", never)
-        monkeypatch.setattr(multiphi_exudyn.levels.model.level_store, "build_level", never)
         other = dataclasses.replace(m, modes=modes)
         assert other.level(("stop",)).modes == (5 if modes == "all" else modes)
 

@@ -12,7 +12,6 @@ from small_structures import chain
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.levels.base import build_base
-from multiphi_exudyn.levels.level import level_modes
 from multiphi_exudyn.mathematics import lowest_modes, modes
 from multiphi_exudyn.mechanics.structure import damping_matrix
 
@@ -45,8 +44,7 @@ def arbitrary(request, monkeypatch):
             vectors[:, index] = vectors[:, index] @ scipy.linalg.qr(random.normal(size=(len(index),) * 2))[0]
         return values, vectors
 
-    for module in (modes, level_modes):
-        monkeypatch.setattr(module, "right_singular_vectors", lambda matrix: mixed(*solver(matrix)))
+    monkeypatch.setattr(modes, "right_singular_vectors", lambda matrix: mixed(*solver(matrix)))
     monkeypatch.setattr(lowest_modes, "lanczos", lambda *given: mixed(*lanczos(*given)))
 
 

@@ -1,12 +1,12 @@
-"""Levels are built with one BLAS thread, and afterwards there are as many as before."""
+"""A base is built with one BLAS thread, and afterwards there are as many as before."""
 
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import multiphi_exudyn as mp
+from multiphi_exudyn.levels.model import level_store
 from multiphi_exudyn.mathematics.blas_threads import one_blas_thread
-from multiphi_exudyn.time import core_levels
 
 
 def threads():
@@ -30,13 +30,12 @@ class TestOneThread:
             assert threads() == {1}
         assert threads() == {2}
 
-    def test_holds_while_levels_are_built(self, monkeypatch):
-        seen, build = [], core_levels.level_data
-        monkeypatch.setattr(core_levels, "level_data", lambda level: (seen.append(threads()), build(level))[1])
+    def test_holds_while_a_base_is_built(self, monkeypatch):
+        seen, build = [], level_store.build_base
+        monkeypatch.setattr(level_store, "build_base", lambda *given: (seen.append(threads()), build(*given))[1])
         stiffness = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])
         chain = mp.LinearStructure(np.eye(3), stiffness, points={"tip": 2})
         model = mp.MultiPhiModel(chain, [mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)])
-        run = mp.simulate(model, 0.5, velocity=-np.ones(3))
-        assert run.events
-        assert seen[-1] == {1}  # what the core asked for
+        assert model.base.complete
+        assert seen == [{1}]
         assert threads() == {2}

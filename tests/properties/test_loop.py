@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 from small_structures import chain, oscillator, stop
 
 import multiphi_exudyn as mp
-from multiphi_exudyn.events.transitions.state import Phase
 from multiphi_exudyn.time import motion as chatter
 from multiphi_exudyn.time.simulate import Run
+from multiphi_exudyn.time.state import Phase
 from reference_models.rig import rig_beam, rig_contact, rig_damping
 
 

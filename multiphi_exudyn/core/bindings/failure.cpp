@@ -31,6 +31,12 @@ void raise_failure(const std::exception_ptr& thrown, void*) {
     } catch (const NumericalFailure& failure) {
         const nb::object type = nb::module_::import_("multiphi_exudyn.errors").attr("NumericalFailure");
         PyErr_SetString(type.ptr(), message_of(failure));
+    } catch (const LevelFailure& failure) {
+        const nb::object type = nb::module_::import_("multiphi_exudyn.errors").attr("NumericalFailure");
+        PyErr_SetString(type.ptr(), failure.what());
+    } catch (const ArgumentError& error) {
+        const nb::object type = nb::module_::import_("multiphi_exudyn.errors").attr("MultiPhiValueError");
+        PyErr_SetString(type.ptr(), error.what());
     } catch (const nb::builtin_exception&) {
         throw;  // an error of an argument, which nanobind raises
     } catch (const std::invalid_argument&) {

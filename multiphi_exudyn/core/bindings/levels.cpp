@@ -1,4 +1,4 @@
-// Bindings of levels, of their transitions and energies. Levels are built by a Python function of the states.
+// Bindings of levels, of their transitions and energies.
 #include "bindings/bindings.hpp"
 
 #include <nanobind/eigen/dense.h>
@@ -8,8 +8,8 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <limits>
 #include <memory>
-#include <new>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -26,34 +26,6 @@ using namespace nb::literals;
 namespace multiphi::bindings {
 
 namespace {
-
-// A Python function of a tuple of states that returns a LevelData; what it raises passes through the core.
-struct PythonBuilder {
-    nb::object function;
-
-    LevelData operator()(const Key& key) const {
-        const nb::gil_scoped_acquire acquired;
-        return nb::cast<const LevelData&>(function(nb::tuple(nb::cast(key))));
-    }
-};
-
-// The builder mostly refers to the object that holds the levels: the garbage collector has to see it.
-int visit_levels(PyObject* self, visitproc visit, void* arg) {
-    Py_VISIT(Py_TYPE(self));
-    if (!nb::inst_ready(self)) return 0;
-    const auto* builder = nb::inst_ptr<Levels>(self)->builder().target<PythonBuilder>();
-    if (builder != nullptr) Py_VISIT(builder->function.ptr());
-    return 0;
-}
-
-int clear_levels(PyObject* self) {
-    if (nb::inst_ready(self)) nb::inst_ptr<Levels>(self)->set_builder({});
-    return 0;
-}
-
-PyType_Slot levels_slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(visit_levels)},
-                              {Py_tp_clear, reinterpret_cast<void*>(clear_levels)},
-                              {0, nullptr}};
 
 // Python functions of the states of a level, or of two, as the core calls them.
 struct PythonForces {
@@ -84,9 +56,10 @@ struct PythonVelocityMap {
     }
 };
 
+// The functions mostly refer to the object that holds the levels: the garbage collector has to see them.
 int visit_held_levels(PyObject* self, visitproc visit, void* arg) {
-    const int status = visit_levels(self, visit, arg);
-    if (status != 0 || !nb::inst_ready(self)) return status;
+    Py_VISIT(Py_TYPE(self));
+    if (!nb::inst_ready(self)) return 0;
     const HeldLevels& levels = *nb::inst_ptr<HeldLevels>(self);
     if (const auto* forces = levels.forces().target<PythonForces>()) Py_VISIT(forces->function.ptr());
     if (!levels.inertia()) return 0;
@@ -97,7 +70,7 @@ int visit_held_levels(PyObject* self, visitproc visit, void* arg) {
 
 int clear_held_levels(PyObject* self) {
     if (nb::inst_ready(self)) nb::inst_ptr<HeldLevels>(self)->set_forces({}, std::nullopt);
-    return clear_levels(self);
+    return 0;
 }
 
 PyType_Slot held_levels_slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(visit_held_levels)},
@@ -107,13 +80,8 @@ PyType_Slot held_levels_slots[] = {{Py_tp_traverse, reinterpret_cast<void*>(visi
 void bind_held_levels(nb::module_& module) {
     nb::class_<HeldLevels, Levels>(module, "HeldLevels", nb::type_slots(held_levels_slots),
                                    "The levels of a model under constant forces that others hold for a step.")
-        .def(
-            "__init__",
-            [](HeldLevels* self, std::shared_ptr<Model> model, std::shared_ptr<Excitation> excitation,
-               nb::callable build) {
-                new (self) HeldLevels(std::move(model), std::move(excitation), PythonBuilder{std::move(build)});
-            },
-            "model"_a, "excitation"_a, "builder"_a)
+        .def(nb::init<std::shared_ptr<Model>, std::shared_ptr<Excitation>, double>(), "model"_a, "excitation"_a,
+             "duration"_a = std::numeric_limits<double>::infinity())
         .def(
             "set_forces",
             [](HeldLevels& levels, nb::callable forces, std::optional<std::pair<nb::callable, nb::callable>> inertia) {
@@ -127,29 +95,6 @@ void bind_held_levels(nb::module_& module) {
             "forces: modal force and direct reactions by the states of a level. inertia: F by the states, and the map "
             "of velocities from one level to another.")
         .def("forget", &HeldLevels::forget);
-}
-
-void make_data(LevelData* self, Key key, std::vector<int> links, Vector squares, Vector computed,
-               Matrix damping_matrix, Matrix coupling, Matrix damping, Matrix modes, Matrix bending,
-               Vector configuration, Vector drive,
-               Vector static_drive, Vector load, double strain, double stored, Matrix gap_rows, Vector gap_constants,
-               Matrix velocity_rows, Matrix force_rows, Matrix force_velocity_rows, Vector forces,
-               Matrix channel_force, Matrix channel_force_rate, Matrix channel_shapes, Matrix carried,
-               std::optional<Matrix> mobility, double duration) {
-    new (self) LevelData{std::move(key),           std::move(links),
-                         std::move(squares),       std::move(computed),
-                         std::move(damping_matrix), std::move(coupling),
-                         std::move(damping),       std::move(modes),
-                         std::move(bending),
-                         std::move(configuration), std::move(drive),
-                         std::move(static_drive),  std::move(load),
-                         strain,                   stored,
-                         std::move(gap_rows),      std::move(gap_constants),
-                         std::move(velocity_rows), std::move(force_rows),
-                         std::move(force_velocity_rows), std::move(forces),
-                         std::move(channel_force), std::move(channel_force_rate),
-                         std::move(channel_shapes), std::move(carried),
-                         std::move(mobility),      duration};
 }
 
 ComplexVector as_vector(const std::vector<Complex>& values) {
@@ -186,13 +131,6 @@ void bind_signals(nb::module_& module) {
 }
 
 void bind_level(nb::module_& module) {
-    nb::class_<LevelData>(module, "LevelData", "What levels/ computes of a level, in base coordinates and in xi.")
-        .def("__init__", make_data, nb::kw_only(), "key"_a, "links"_a, "squares"_a, "computed"_a, "damping_matrix"_a,
-             "coupling"_a, "damping"_a, "modes"_a, "bending"_a, "configuration"_a, "drive"_a, "static_drive"_a, "load"_a,
-             "strain"_a,
-             "stored"_a, "gap_rows"_a, "gap_constants"_a, "velocity_rows"_a, "force_rows"_a, "force_velocity_rows"_a,
-             "forces"_a, "channel_force"_a, "channel_force_rate"_a, "channel_shapes"_a, "carried"_a,
-             "mobility"_a = nb::none(), "duration"_a);
     nb::class_<PotentialForm>(module, "PotentialForm")
         .def_ro("constant", &PotentialForm::constant)
         .def_prop_ro("linear", [](const PotentialForm& form) { return Vector(form.linear); })
@@ -208,9 +146,30 @@ void bind_level(nb::module_& module) {
         .def_prop_ro("omega", &Level::omega, nb::rv_policy::copy)
         .def_prop_ro("periods", &Level::periods, nb::rv_policy::copy)
         .def_prop_ro("highest_frequency", &Level::highest_frequency)
+        .def_prop_ro("links", [](const Level& level) { return nb::tuple(nb::cast(level.data().links)); })
+        .def_prop_ro("squares", [](const Level& level) { return Vector(level.data().squares); })
+        .def_prop_ro("computed", [](const Level& level) { return Vector(level.data().computed); })
+        .def_prop_ro("damping_matrix", [](const Level& level) { return Matrix(level.data().damping_matrix); })
+        .def_prop_ro("damping", [](const Level& level) { return Matrix(level.data().damping); })
+        .def_prop_ro("coupling", [](const Level& level) { return Matrix(level.data().coupling); })
+        .def_prop_ro("shapes", [](const Level& level) { return level.data().shapes(); })
+        .def_prop_ro("configuration", [](const Level& level) { return Vector(level.data().configuration); })
+        .def_prop_ro("drive", [](const Level& level) { return Vector(level.data().drive); })
+        .def_prop_ro("static_drive", [](const Level& level) { return Vector(level.data().static_drive); })
+        .def_prop_ro("load", [](const Level& level) { return Vector(level.data().load); })
+        .def_prop_ro("static_strain", [](const Level& level) { return level.data().strain; })
+        .def_prop_ro("stored", [](const Level& level) { return level.data().stored; })
         .def_prop_ro("gap_rows", [](const Level& level) { return Matrix(level.data().gap_rows); })
         .def_prop_ro("gap_constants", [](const Level& level) { return Vector(level.data().gap_constants); })
         .def_prop_ro("velocity_rows", [](const Level& level) { return Matrix(level.data().velocity_rows); })
+        .def_prop_ro("force_rows", [](const Level& level) { return Matrix(level.data().force_rows); })
+        .def_prop_ro("force_velocity_rows", [](const Level& level) { return Matrix(level.data().force_velocity_rows); })
+        .def_prop_ro("forces", [](const Level& level) { return Vector(level.data().forces); })
+        .def_prop_ro("channel_force", [](const Level& level) { return Matrix(level.data().channel_force); })
+        .def_prop_ro("channel_force_rate", [](const Level& level) { return Matrix(level.data().channel_force_rate); })
+        .def_prop_ro("channel_shapes", [](const Level& level) { return Matrix(level.data().channel_shapes); })
+        .def_prop_ro("carried", [](const Level& level) { return Matrix(level.data().carried); })
+        .def_prop_ro("response", &Level::response, nb::rv_policy::reference_internal)
         .def_prop_ro("displacement_acceleration", &Level::displacement_acceleration, nb::rv_policy::copy)
         .def_prop_ro("velocity_acceleration", &Level::velocity_acceleration, nb::rv_policy::copy)
         .def_prop_ro("constant_acceleration", &Level::constant_acceleration, nb::rv_policy::copy)
@@ -266,19 +225,21 @@ void bind_levels(nb::module_& module) {
     bind_signals(module);
     bind_level(module);
     nb::class_<Transition>(module, "Transition", "A state expressed in the coordinates of the next level.")
+        .def(nb::init<const Level&, const Level&>(), "source"_a, "target"_a, nb::keep_alive<1, 2>(),
+             nb::keep_alive<1, 3>())
         .def_prop_ro("matrix", [](const Transition& transition) { return Matrix(transition.matrix); })
         .def_prop_ro("velocity_matrix", [](const Transition& transition) { return Matrix(transition.velocity_matrix); })
         .def_prop_ro("offset", [](const Transition& transition) { return Vector(transition.offset); })
         .def_prop_ro("terms", [](const Transition& transition) { return transition.terms; })
         .def_prop_ro("start_sizes", [](const Transition& transition) { return Matrix(transition.start_sizes); });
-    nb::class_<Levels>(module, "Levels", nb::type_slots(levels_slots),
-                       "The levels of a model under its loads, built on first use by a function of the states.")
-        .def(
-            "__init__",
-            [](Levels* self, std::shared_ptr<Model> model, std::shared_ptr<Excitation> excitation, nb::callable build) {
-                new (self) Levels(std::move(model), std::move(excitation), PythonBuilder{std::move(build)});
-            },
-            "model"_a, "excitation"_a, "builder"_a)
+    nb::class_<DefectForm>(module, "DefectForm", "Maps of (1, xi, s) and (xi', s') to what a level entered cannot hold.")
+        .def(nb::init<const Transition&, const std::vector<int>&>(), "transition"_a, "stopped"_a,
+             "stopped: links along which an impact has left no velocity.")
+        .def_prop_ro("displaced", [](const DefectForm& form) { return form.displaced; })
+        .def_prop_ro("moving", [](const DefectForm& form) { return form.moving; });
+    nb::class_<Levels>(module, "Levels", "The levels of a model under its loads, built on first use.")
+        .def(nb::init<std::shared_ptr<Model>, std::shared_ptr<Excitation>, double>(), "model"_a, "excitation"_a,
+             "duration"_a = std::numeric_limits<double>::infinity(), "duration: of the longest motion [s].")
         .def_prop_ro("model", &Levels::model, nb::rv_policy::reference_internal)
         .def_prop_ro("base", &Levels::base, nb::rv_policy::reference_internal)
         .def("level", &Levels::level, "states"_a, nb::rv_policy::reference_internal,

@@ -14,17 +14,15 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse
 
-from multiphi_exudyn._core import are_independent
+import multiphi_exudyn._core as core
 from multiphi_exudyn.display import Shown, names
-from multiphi_exudyn.levels.base.closed_directions import ClosedDirections
-from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.modes import Modes
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import Matrix
@@ -35,10 +33,6 @@ __all__ = ["ModalBase", "parallel"]
 
 PARALLEL = 1e-14  # of the largest component: directions that differ by less differ by round-off
 NEARLY_PARALLEL = 1 - 1e-6  # cosine of two directions that are compared closely
-INTERLACING = 1e-8  # relative violation of the interlacing theorem that is still round-off
-EPSILON = float(np.finfo(float).eps)
-CLOSED_SETS = 8  # of contacts, whose directions are cached: a level needs them when it is built and when it is loaded
-CANCELLED = 1e-13  # of sum |k|: a total stiffness of a force law below it is round-off of zero
 
 
 @dataclass(frozen=True, repr=False)
@@ -115,38 +109,41 @@ class ModalBase(ElementTable, Shown):
         return self.lengths == 0
 
     @functools.cached_property
-    def observed_rows(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows (k, m) of links and points, and their largest values (k + m,) at a unit mode, coordinates last."""
-        rows = np.vstack([self.directions.T, self.points])
-        return rows, np.concatenate([np.linalg.norm(rows, axis=1), np.ones(self.modes.count)])
+    def core_base(self) -> core.Base:
+        """The base as the core takes it, which builds levels from it."""
+        return core.Base(
+            squares=self.squares,
+            rigid_body_modes=self.modes.rigid,
+            damping=self.damping,
+            directions=self.directions.T,
+            force_directions=self.pushes.T,
+            gaps=self.gaps,
+            stiffnesses=self.stiffnesses,
+            dampings=self.dampings,
+            preload=self.preload,
+            energy_offset=self.energy_offset,
+            held=self.held,
+            oblique=list(self.oblique),
+            residual=self.residual,
+            parallel=parallel(self.directions),
+            general=self.general,
+            points=self.points,
+            names=["" if i in self.laws else link.name for i, link in enumerate(self.links)],
+            labels=self.labels,
+        )
 
-    @functools.cached_property
-    def direction_rows(self) -> np.ndarray:
-        """Directions (l, m) of links, row by row in memory."""
-        return np.ascontiguousarray(self.directions.T)
+    def __getstate__(self) -> dict[str, Any]:
+        return {key: value for key, value in vars(self).items() if key != "core_base"}  # a copy makes its own
 
     def independent(self, rigid: Sequence[int]) -> bool:
         """Return whether the directions of these rigid contacts are linearly independent: they can close together."""
-        m, k = self.modes.count, len(rigid)
-        if k <= 1 or k > m:
-            return k <= m and not any(self.unmoved[i] for i in rigid)
-        return bool(are_independent(self.direction_rows, self.lengths, list(rigid)))
-
-    @functools.cached_property
-    def direction_indices(self) -> list[int]:
-        """For every link the index of the first link with the same direction up to its sign."""
-        return parallel(self.directions)
-
-    @functools.cached_property
-    def direction_signs(self) -> np.ndarray:
-        """Sign (c,) of every contact's direction relative to the first link with that direction (direction_indices)."""
-        along = np.sum(self.directions * self.directions[:, self.direction_indices], axis=0)
-        return np.where(along < 0, -1.0, 1.0)
+        return self.core_base.are_independent(list(rigid))
 
     def pressing(self, element: int) -> dict[int, int]:
         """Return the links of an element without a held place, and the signs of their directions to its own."""
         links = [k for k in self.link_indices[element] if not self.links[k].held]
-        return {k: int(self.direction_signs[k] * self.direction_signs[element]) for k in links}
+        signs = self.core_base.orientation
+        return {k: int(signs[k] * signs[element]) for k in links}
 
     @functools.cached_property
     def preload(self) -> np.ndarray:
@@ -171,21 +168,10 @@ class ModalBase(ElementTable, Shown):
         return self.modes.omega**2
 
     @functools.cached_property
-    def square_bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Omega^2 (m,) minus and plus the amount by which round-off may violate the interlacing theorem."""
-        slack = INTERLACING * self.squares + EPSILON * self.squares.max(initial=0.0)
-        return self.squares - slack, self.squares + slack
-
-    @functools.cached_property
     def periods(self) -> np.ndarray:
         """1 / Omega (m,) [s/rad], zero of rigid-body modes."""
         omega = self.modes.omega
         return np.divide(1.0, omega, out=np.zeros_like(omega), where=omega > 0)
-
-    @functools.cached_property
-    def compliance(self) -> np.ndarray:
-        """Omega^-2 (e,) [s2/rad2] of the elastic modes."""
-        return self.modes.omega[self.modes.rigid :] ** -2.0
 
     def damping_matrix(self, closed: Sequence[int]) -> np.ndarray:
         """Return C_l (m, m) in these coordinates: damping of the structure and of closed viscous contacts."""
@@ -194,100 +180,6 @@ class ModalBase(ElementTable, Shown):
             return self.damping
         directions = self.directions[:, viscous]
         return np.asarray(self.damping + (directions * self.dampings[viscous]) @ directions.T)
-
-    def largest_damping(self, closed: Sequence[int]) -> float:
-        """Return the largest element of C_l, which is on the diagonal, as C_l is positive semidefinite."""
-        diagonal = np.diagonal(self.damping) + self.directions[:, closed] ** 2 @ self.dampings[closed]
-        return float(diagonal.max(initial=0.0))
-
-    def damped(self, vectors: np.ndarray, closed: Sequence[int]) -> np.ndarray:
-        """Return C_l v (m, k) for vectors v (m, k), without forming C_l."""
-        modal = self._modal_damping
-        product = self.damping @ vectors if modal is None else modal[:, None] * vectors
-        viscous = [i for i in closed if self.dampings[i]]
-        if viscous:
-            directions = self.directions[:, viscous]
-            product += (directions * self.dampings[viscous]) @ (directions.T @ vectors)
-        return np.asarray(product)
-
-    @functools.cached_property
-    def _modal_damping(self) -> np.ndarray | None:
-        """Diagonal (m,) of the structure's damping matrix where it is diagonal, None where it couples modes."""
-        diagonal = np.diagonal(self.damping)
-        return diagonal.copy() if np.count_nonzero(self.damping) == np.count_nonzero(diagonal) else None
-
-    def closed_at(self, closed: tuple[int, ...]) -> ClosedDirections:
-        """Return ``closed_directions`` with the gaps at y = 0; those of the latest sets of contacts are cached."""
-        return self._closed_cache.get_or_build(closed, lambda: self.closed_directions(closed, self.gaps[list(closed)]))
-
-    @functools.cached_property
-    def _closed_cache(self) -> BoundedCache[tuple[int, ...], ClosedDirections]:
-        return BoundedCache(CLOSED_SETS)
-
-    def closed_directions(self, closed: Sequence[int], gaps: np.ndarray) -> ClosedDirections:
-        """Return the directions of closed contacts with gaps (k,), parallel ones merged, but no two rigid ones."""
-        if len(closed) == 1:  # views
-            (i,), first = closed, self.direction_indices[closed[0]]
-            offset = self.direction_signs[i : i + 1] * gaps
-            return ClosedDirections(((i,),), self.directions[:, first : first + 1], self.stiffnesses[i : i + 1], offset)
-        first_links = [self.direction_indices[i] for i in closed]
-        if len(set(first_links)) == len(first_links):
-            index, single = list(closed), tuple((i,) for i in closed)
-            return ClosedDirections(
-                single, self.directions[:, first_links], self.stiffnesses[index], self.direction_signs[index] * gaps
-            )
-        groups: dict[int, list[int]] = {}
-        gap_of = dict(zip(closed, gaps.tolist(), strict=True))
-        for i in closed:
-            groups.setdefault(self.direction_indices[i], []).append(i)
-        merged = [part for members in groups.values() for part in self._split_rigid(members)]
-        stiffness, offsets = np.zeros((2, len(merged)))
-        for j, members in enumerate(merged):
-            k, signed = self.stiffnesses[members], self.direction_signs[members] * [gap_of[i] for i in members]
-            stiffness[j] = np.sum(k)
-            rigid = np.isinf(k)
-            if len(members) == 1 or np.any(rigid):
-                offsets[j] = signed[np.argmax(rigid)]
-                continue
-            if abs(stiffness[j]) <= CANCELLED * np.sum(np.abs(k)):
-                stiffness[j] = 0.0
-            offsets[j] = np.sum(k * signed) / (stiffness[j] or 1.0)
-        directions = self.directions[:, [self.direction_indices[members[0]] for members in merged]]
-        return ClosedDirections(tuple(map(tuple, merged)), directions, stiffness, offsets)
-
-    def _split_rigid(self, members: list[int]) -> list[list[int]]:
-        """Return the groups of contacts of one direction: every rigid contact but the first is a group of its own."""
-        further = [i for i in members if math.isinf(self.stiffnesses[i])][1:]
-        return [[i for i in members if i not in further], *([i] for i in further)]
-
-    def stiffness_sizes(self, closed: Sequence[int], vectors: np.ndarray) -> np.ndarray:
-        """Return the sums (r,) of |stiffnesses| of the structure and of closed springs along modes (m, r).
-
-        Of the stiffnesses themselves it is omega^2.
-        """
-        springs = np.where(np.isinf(self.stiffnesses[list(closed)]), 0.0, np.abs(self.stiffnesses[list(closed)]))
-        return np.asarray(self.squares @ vectors**2 + springs @ (self.directions[:, list(closed)].T @ vectors) ** 2)
-
-    def contact_forces(
-        self, closed: list[int], closed_directions: ClosedDirections, along: np.ndarray, gaps: np.ndarray
-    ) -> np.ndarray:
-        """Return lambda (k,) [N] of closed contacts from forces (d,) along their directions and gaps (l,).
-
-        The forces of springs of one direction follow from their gaps; a rigid contact among them has the remainder.
-        """
-        if closed_directions.members == tuple(zip(closed)):
-            return np.asarray(self.direction_signs[closed] * along)
-        forces = np.zeros(len(self.links))
-        for members, force in zip(closed_directions.members, along.tolist(), strict=True):
-            index, rigid = list(members), [i for i in members if math.isinf(self.stiffnesses[i])]
-            if len(index) > 1:
-                springs = [i for i in index if i not in rigid]
-                offset = self.direction_signs[rigid[0]] * gaps[rigid[0]] if rigid else 0.0  # round-off of zero
-                forces[springs] = -self.stiffnesses[springs] * (gaps[springs] - self.direction_signs[springs] * offset)
-                force -= self.direction_signs[springs] @ forces[springs]
-                index = rigid
-            forces[index] = self.direction_signs[index] * force
-        return forces[closed]
 
 
 def parallel(directions: np.ndarray) -> list[int]:

@@ -17,11 +17,11 @@ from __future__ import annotations
 
 import numpy as np
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.equilibrium.equilibrium_on_contacts import equilibrium_on_contacts
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import equilibrium_along_path
-from multiphi_exudyn.levels.level.build_level import build_level
 from multiphi_exudyn.mathematics.least_distance import Infeasible, least_distance
 from multiphi_exudyn.mathematics.round_off import BALANCED, drop_round_off
 
@@ -52,8 +52,8 @@ def equilibrium_under_forces(
     gaps = base.directions.T @ (compliance * load) + base.gaps
     bending = base.directions.T / base.modes.omega
     closed = _active_constraints(np.hstack([bending, np.diag(base.stiffnesses**-0.5)]), -gaps)
-    level = build_level(base, tuple(int(i) for i in np.flatnonzero(closed)))
-    return level.asymptotic(load).configuration, np.zeros(len(base.contacts))
+    response = core.static_response(base.core_base, np.flatnonzero(closed).tolist(), base.gaps[closed], load)
+    return response[1], np.zeros(len(base.contacts))
 
 
 def _unbalanced(base: ModalBase, load: np.ndarray, size: np.ndarray) -> float:

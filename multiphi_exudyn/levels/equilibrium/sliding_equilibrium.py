@@ -10,9 +10,9 @@ import itertools
 
 import numpy as np
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.errors import NumericalFailure
 from multiphi_exudyn.levels.base.modal_base import ModalBase
-from multiphi_exudyn.levels.level.static_response import static_response
 
 __all__ = ["static_response_with_friction"]
 
@@ -46,10 +46,8 @@ def _frictionless_response(
             f"static equilibrium: {names} hold the same motion, so how they share the load is not unique; need "
             "contacts of finite stiffness, or a spring in series with friction"
         )
-    closed_directions = base.closed_directions(index, gaps[index])
-    along, configuration = static_response(base, closed_directions, load)
     forces = np.zeros(len(base.links))
-    forces[index] = base.contact_forces(index, closed_directions, along, base.gaps_at(configuration, gaps))
+    forces[index], configuration = core.static_response(base.core_base, index, gaps[index], load)
     return forces, configuration
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mechanics.arguments import real_array
 
@@ -55,3 +57,9 @@ class LevelOverride:
                 if values.ndim != 1:
                     raise MultiPhiValueError(f"level override {name}: got shape {values.shape}, need a list of numbers")
                 object.__setattr__(self, name, tuple(values.tolist()))
+
+    @property
+    def arrays(self) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Frequencies and ratios as arrays (k,), None where the computed ones stay."""
+        frequencies, ratios = (None if each is None else np.array(each) for each in (self.frequencies, self.ratios))
+        return frequencies, ratios

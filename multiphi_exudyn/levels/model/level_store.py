@@ -1,4 +1,4 @@
-"""Level store: the base and the levels that models of one structure and the same contacts share."""
+"""Level store: the base that models of one structure and the same contacts share."""
 
 from __future__ import annotations
 
@@ -10,11 +10,8 @@ import numpy as np
 
 from multiphi_exudyn.levels.base.build_base import COMPLETE, build_base
 from multiphi_exudyn.levels.base.modal_base import ModalBase
-from multiphi_exudyn.levels.level.build_level import build_level
-from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.model.mode_choice import FIRST
 from multiphi_exudyn.mathematics.blas_threads import one_blas_thread
-from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.lowest_modes import missing_flexibility
 from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.structure import LinearStructure
@@ -26,7 +23,7 @@ FEWEST_LEVELS = 8  # cached whatever their size: a run that alternates between t
 
 
 class LevelStore:
-    """Base and levels of a structure with contacts, built on first use.
+    """Base of a structure with contacts, built on first use.
 
     first: number of modes for which an incomplete base is built if no number is given. chosen: the number chosen then,
     None before. base: None before it is built. load_rows: rows (k, n) of loads for the base. narrow: the model without
@@ -42,7 +39,6 @@ class LevelStore:
         self.load_rows: np.ndarray | None = None
         self.narrow: Any = None
         self._previous_base: ModalBase | None = None
-        self._levels: BoundedCache[tuple[int, ...], Level] | None = None
         self._missing: dict[bytes, float] = {}
         if earlier is not None and earlier.structure is structure:
             self.load_rows, self.narrow, self._previous_base = (
@@ -70,18 +66,6 @@ class LevelStore:
         assert self.base is not None, "levels need a base"
         numbers_per_mode = self.base.modes.count + 30 * r + 2 * len(self.base.links)
         return max(FEWEST_LEVELS, CACHE_BYTES // (8 * r * numbers_per_mode))
-
-    def level(self, indices: tuple[int, ...], modes: int) -> Level:
-        """Return a level with at least its lowest ``modes`` modes, or with all; its last mode ends a cluster."""
-        base, levels = self.base, self._levels
-        assert base is not None, "levels need a base"
-        if levels is None:
-            levels = self._levels = BoundedCache(self.cache_capacity(modes))
-        most = base.modes.count - sum(base.links[i].rigid for i in indices)
-        level = levels.find(indices)
-        if level is None or level.modes < min(modes, most):
-            level = levels.keep(indices, build_level(base, indices, modes if modes < most else None))
-        return level
 
     def outside(self, row: np.ndarray) -> float:
         """Return the share of the static flexibility at a row (n,) that the base does not represent."""

@@ -21,14 +21,13 @@ from __future__ import annotations
 
 import bisect
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.base.modal_base import ModalBase
-from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
@@ -121,15 +120,10 @@ class Tolerance:
         _check_limits(self, "error", self.error, self.most)
 
 
-def choose_mode_count(
-    structure: LinearStructure,
-    base: ModalBase,
-    level: Callable[[tuple[int, ...], int], Level],
-) -> int:
+def choose_mode_count(structure: LinearStructure, base: ModalBase) -> int:
     """Return the number of modes r for ``None``; see the module's docstring.
 
-    If it is larger than the base allows, the choice has to be repeated with a larger base. level: function of the
-    positions of active links and a number of modes; it returns the level with at least so many modes, or all.
+    If it is larger than the base allows, the choice has to be repeated with a larger base.
     """
     count = max(FEWEST, base.modes.rigid + 1)
     if any(link.rigid for link in base.links):
@@ -140,11 +134,11 @@ def choose_mode_count(
     most = min(MOST, base.most_level_modes)
     for closed in _single_closures(base):
         bound = most if not base.links[closed[0]].held else min(most, max(count, RIGID))
-        count = count if count >= bound else _count_for_contact(level, closed, count, bound)
+        count = count if count >= bound else _count_for_contact(base, closed, count, bound)
         if (
             bound == count == base.most_level_modes
             and not base.complete
-            and not _is_represented(level(closed, count).truncated(count))
+            and not _is_represented(_level(base, closed, count), count)
         ):
             return min(2 * count, MOST)
     return min(count, most)
@@ -177,20 +171,24 @@ def _stiffest(base: ModalBase, law: int) -> tuple[int, ...]:
     return max(segments, key=lambda links: float(np.sum(base.stiffnesses[list(links)])))
 
 
-def _count_for_contact(
-    level: Callable[[tuple[int, ...], int], Level], closed: tuple[int, ...], fewest: int, most: int
-) -> int:
+def _count_for_contact(base: ModalBase, closed: tuple[int, ...], fewest: int, most: int) -> int:
     """Return the least number of modes, ``fewest`` to ``most``, that represent the flexibility of closed contacts."""
     count = min(max(FIRST, fewest), most)
-    while count < most and not _is_represented(level(closed, count).truncated(count)):
+    while count < most and not _is_represented(_level(base, closed, count), count):
         count = min(2 * count, most)
-    largest = level(closed, count)
+    largest = _level(base, closed, count)
     counts = range(fewest, count)
-    return fewest + bisect.bisect_left(counts, True, key=lambda r: _is_represented(largest.truncated(r)))
+    return fewest + bisect.bisect_left(counts, True, key=lambda r: _is_represented(largest, r))
 
 
-def _is_represented(level: Level) -> bool:
-    return max(level.static_shares.values(), default=0.0) < CONTACT_SHARE
+def _level(base: ModalBase, closed: tuple[int, ...], count: int) -> core.ModalLevel:
+    """Return the level of closed contacts with its lowest ``count`` modes."""
+    return core.MovingLevel(base.core_base, list(closed), core.KeptModes(count)).modal
+
+
+def _is_represented(level: core.ModalLevel, count: int) -> bool:
+    """Return whether the first ``count`` modes of a level represent the flexibility of its contacts."""
+    return max(level.static_shares(count).values(), default=0.0) < CONTACT_SHARE
 
 
 def is_count(value: object) -> bool:

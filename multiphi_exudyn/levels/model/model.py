@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.display import Shown, names
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError, MultiPhiWarning
 from multiphi_exudyn.levels.base.stiffness_warnings import stiffness_warnings
@@ -17,8 +19,6 @@ from multiphi_exudyn.levels.equilibrium.equilibrium_under_forces import equilibr
 from multiphi_exudyn.levels.equilibrium.static_equilibrium import Equilibrium
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.level.level_override import LevelOverride
-from multiphi_exudyn.levels.level.residual_level import ResidualBoundary
-from multiphi_exudyn.levels.level.sliding import with_sliding
 from multiphi_exudyn.levels.model.level_store import LevelStore
 from multiphi_exudyn.levels.model.mode_choice import Tolerance, UpTo
 from multiphi_exudyn.levels.model.model_arguments import (
@@ -38,6 +38,7 @@ __all__ = ["MultiPhiModel"]
 
 CALLER = 3  # level of the stack: the line that asks for an equilibrium
 WIDER = 2  # cached models with a base for other loads, each with n numbers for every coordinate
+MODAL_LEVELS = "modal_levels"  # the name of what a copy does not take along
 ENTRIES = 64  # cached results that other modules derive from a model, such as sentences on its levels
 LOADS = 16  # cached sets of levels under loads, one for each key; static loads have two
 
@@ -185,33 +186,36 @@ class MultiPhiModel(SharedBase, Shown):
     @property
     def levels_built(self) -> int:
         """Number of levels built so far, including those built again."""
-        return self._levels.kept if "_levels" in vars(self) else 0  # no display of a model builds its base
+        return self.modal_levels.built if MODAL_LEVELS in vars(self) else 0  # no display of a model builds its base
 
     @property
     def levels_kept(self) -> int:
-        """Number of cached levels."""
-        return len(self._levels) if "_levels" in vars(self) else 0
+        """Number of levels that are kept."""
+        return self.modal_levels.count if MODAL_LEVELS in vars(self) else 0
 
     @property
     def highest_frequency(self) -> float:
-        """Highest frequency [Hz] of the cached levels."""
-        return max((level.highest_frequency for _, level in self._levels.items()), default=0.0)
+        """Highest frequency [Hz] of the levels that are kept."""
+        return self.modal_levels.highest_frequency if MODAL_LEVELS in vars(self) else 0.0
 
     @functools.cached_property
     def most_levels(self) -> int:
-        """Largest number of cached levels."""
+        """Largest number of levels that are kept."""
         modes = self.most_modes or self.base.modes.count
         self._shared_base()
         return self._shared_store.cache_capacity(modes)
 
     @functools.cached_property
-    def _levels(self) -> BoundedCache[tuple[int, ...], Level]:
-        return BoundedCache(self.most_levels, self._forget)
+    def modal_levels(self) -> core.ModalLevels:
+        """The levels in the core, each built on first use."""
+        highest = self.modes.frequency if isinstance(self.modes, UpTo) else math.inf
+        measured = [(list(self.links_named(closed)), *given.arrays) for closed, given in self.overrides.items()]
+        levels = core.ModalLevels(self.base.core_base, self.most_modes, highest, measured)
+        levels.set_most(self.most_levels)
+        return levels
 
-    def _forget(self, indices: tuple[int, ...], level: Level) -> None:
-        """Delete what is derived from a level; a trajectory may still refer to the level itself."""
-        for _, loaded_levels in self.loaded.items():
-            loaded_levels.forget(indices)
+    def __getstate__(self) -> dict[str, Any]:
+        return {key: value for key, value in vars(self).items() if key != MODAL_LEVELS}  # a copy builds its own
 
     def _facts(self) -> Iterator[tuple[str, str]]:
         yield "degrees of freedom", str(self.structure.n)
@@ -246,30 +250,7 @@ class MultiPhiModel(SharedBase, Shown):
 
     def level_at(self, indices: tuple[int, ...]) -> Level:
         """Return the level of closed contacts given by ascending positions."""
-        cached = self._levels.find(indices)
-        if cached is not None:
-            return cached
-        closed = [i for i in indices if i in self.residual]
-        if closed:
-            host = tuple(i for i in indices if i not in self.residual)
-            return self._levels.keep(indices, self.residual_boundary(host).level(closed))
-        level = self._untruncated(indices)
-        level = level.truncated(self._mode_count(level))
-        override = self.overrides.get(level.closed)
-        return self._levels.keep(indices, with_sliding(level if override is None else level.overridden(override)))
-
-    def residual_boundary(self, indices: tuple[int, ...]) -> ResidualBoundary:
-        """Return the residual contacts beside the level of closed contacts given by ascending positions."""
-        boundary: ResidualBoundary = self.entries.get_or_build(
-            ("residual boundary", indices), lambda: ResidualBoundary.of(self.level_at(indices))
-        )
-        return boundary
-
-    def _untruncated(self, indices: tuple[int, ...]) -> Level:
-        """Return a level with at least the modes of this model, shared with models of other numbers of modes."""
-        modes = self.most_modes or self.base.modes.count
-        self._shared_base()
-        return self._shared_store.level(indices, modes)
+        return Level(self.base, self.modal_levels.level(list(indices)))
 
     def static_equilibrium(self, forces: Mapping[str, float], inertia_relief: bool = False) -> np.ndarray:
         """Return the equilibrium x (n,) [m, rad] under forces at points, with the contacts that close.
@@ -342,10 +323,3 @@ class MultiPhiModel(SharedBase, Shown):
         if not isinstance(forces, Mapping):
             raise MultiPhiTypeError(f"forces: got {type(forces).__name__}, need {{point: force in N}}")
         return self.structure.row(forces) if forces else np.zeros(self.structure.n)
-
-    def _mode_count(self, level: Level) -> int:
-        """Return the number of modes to which a level is truncated in this model."""
-        most = min(self.most_modes or level.modes, level.modes)
-        if not isinstance(self.modes, UpTo):
-            return most
-        return min(max(1, int(np.searchsorted(level.frequencies, self.modes.frequency, side="right"))), most)

@@ -70,7 +70,7 @@ class SharedBase(ElementTable):
             return None
         while self._shared_store.chosen is None:
             base = self._shared_base()
-            count = choose_mode_count(self.structure, base, self._shared_store.level)
+            count = choose_mode_count(self.structure, base)
             if self._shared_store.serves(count):
                 self._shared_store.chosen = count
             else:

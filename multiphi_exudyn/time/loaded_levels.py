@@ -1,6 +1,6 @@
 """Loaded levels: the levels of one model under the loads of a run.
 
-They are built when first used, and kept as long as the model's bound on memory allows.
+The core builds each when it is first used, and keeps those of static loads for later runs.
 """
 
 from __future__ import annotations
@@ -12,29 +12,28 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from multiphi_exudyn.events.excitation.excitation import Excitation
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
-from multiphi_exudyn.events.transitions.state import State
+import multiphi_exudyn._core as core
+from multiphi_exudyn.levels.core_model import core_model
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.round_off import power_of_two_above
+from multiphi_exudyn.time.excitation import Excitation
+from multiphi_exudyn.time.loaded_level import LoadedLevel
+from multiphi_exudyn.time.state import State
 
 __all__ = ["LoadedLevels"]
 
 DERIVED_KEPT = 8  # derived values of a level: two step sizes of a solver, attachments at two positions
+MOST_BYTES = 2**29  # of the core's levels that are kept between runs: half of what a model may keep
 
 T = TypeVar("T")
 
 
 @dataclass
 class _LevelEntry:
-    """A level with the ``links`` that hold in it.
-
-    further: values derived from the level elsewhere, by their keys.
-    """
+    """A level, and values derived from it elsewhere, by their keys."""
 
     level: LoadedLevel
-    links: tuple[int, ...]
     further: BoundedCache[Hashable, Any] = field(default_factory=lambda: BoundedCache(DERIVED_KEPT))
 
 
@@ -43,8 +42,7 @@ class LoadedLevels:
 
     The key of a level is the state numbers of all elements. alone: the levels under the static loads alone, with held
     displacements as channels, which are kept longer than a run; it is these levels if nothing varies. lasting: the
-    longest duration [s] of a motion. core: the core's levels, for later runs (time/core_levels.py). held:
-    the same under forces that bodies hold for a step.
+    longest duration [s] of a motion. held: the same under forces that bodies hold for a step (coupled.py).
     """
 
     def __init__(
@@ -61,13 +59,11 @@ class LoadedLevels:
         self.alone = alone or self
         self.lasting = lasting
         self.set_interval(time, until)
-        self.core: Any = None
         self.held: Any = None
         self._entries = BoundedCache[tuple[int, ...], _LevelEntry](model.most_levels)
-        self._pushed = BoundedCache[tuple[int, ...], LoadedLevel](model.most_levels)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "core": None, "held": None}  # a copy makes its own
+        return {**vars(self), "held": None, "_core": None}  # a copy makes its own
 
     @classmethod
     def static(cls, model: MultiPhiModel, load: np.ndarray, lasting: float = math.inf) -> LoadedLevels:
@@ -85,11 +81,23 @@ class LoadedLevels:
         load, longest = excitation.static, _longest_motion(model, lasting)
         key = load.tobytes(), longest
         alone: LoadedLevels = model.loaded.get_or_build(key, lambda: cls.static(model, load, longest))
-        return cls(model, excitation, time, end, alone) if excitation.prescribed else alone
+        return cls(model, excitation, time, end, alone, longest) if excitation.prescribed else alone
 
     def set_interval(self, time: float, until: float) -> None:
         """Set the time and end [s] of the motions that follow."""
-        self.drive, self.until, self.core = self.excitation.drive(time), until, None
+        self.drive, self.until = self.excitation.drive(time), until
+        self._core: core.Levels | None = None
+
+    @property
+    def in_core(self) -> core.Levels:
+        """The core's levels for these motions, kept for later runs up to a bound."""
+        if self._core is None or self._core.bytes > MOST_BYTES:
+            self._core = core.Levels(core_model(self.model), self.core_excitation(), self.lasting)
+        return self._core
+
+    def core_excitation(self) -> core.Excitation:
+        """Return the static and varying loads, from the start of the motions until these end."""
+        return self.excitation.in_core(self.drive.time, self.until, self.isolated)
 
     @property
     def isolated(self) -> bool:
@@ -103,9 +111,7 @@ class LoadedLevels:
 
     def level(self, states: Sequence[int]) -> LoadedLevel:
         """Return the level of elements in these states, under the loads and the constant forces of elements."""
-        entry = self._entry(tuple(states))
-        self.model.level_at(entry.links)  # marks it as used last among those that the model keeps
-        return entry.level
+        return self._entry(tuple(states)).level
 
     def kept(self, states: tuple[int, ...]) -> LoadedLevel | None:
         """Return the level of elements in these states if it is among those that are kept."""
@@ -117,35 +123,12 @@ class LoadedLevels:
         value: T = self._entry(states).further.get_or_build(key, make)
         return value
 
-    def forget(self, links: tuple[int, ...]) -> None:
-        """Drop what is kept of the levels in which these links hold."""
-        for states in [states for states, entry in self._entries.items() if entry.links == links]:
-            self._entries.drop(states)
-        for states in [states for states, level in self._pushed.items() if level.level.indices == links]:
-            self._pushed.drop(states)
-
     def _entry(self, states: tuple[int, ...]) -> _LevelEntry:
         return self._entries.get_or_build(states, lambda: self._build_entry(states))
 
     def _build_entry(self, states: tuple[int, ...]) -> _LevelEntry:
-        level = self.alone.pushed(states)
-        links = level.level.indices
-        under = self.alone is not self or self.model.general
-        return _LevelEntry(level.under(self.excitation) if under else level, links)
-
-    def pushed(self, states: tuple[int, ...]) -> LoadedLevel:
-        """Return the level under the static loads and constant forces of elements, without varying channels.
-
-        It is kept for all excitations. The forces of elements are among its loads, but not among those of a level with
-        channels.
-        """
-        return self._pushed.get_or_build(states, lambda: self._build_static(states))
-
-    def _build_static(self, states: tuple[int, ...]) -> LoadedLevel:
-        level = self.model.level_at(self.model.active_links(states))
-        if self.model.general:
-            return LoadedLevel.of(level, self.load + self.model.push(states), states, lasting=self.lasting)
-        return LoadedLevel.of(level, self.load, states, self.excitation, self.lasting)
+        of_core = self.in_core.level(states)
+        return _LevelEntry(LoadedLevel(self.model.level_at(of_core.links), self.excitation, of_core))
 
     def with_channels(self, state: State) -> State:
         """Return a state under the static loads alone as a state of these levels, at the start of their interval."""

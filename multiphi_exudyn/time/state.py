@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from multiphi_exudyn.display import Shown
-from multiphi_exudyn.events.excitation.loaded_level import LoadedLevel
 from multiphi_exudyn.mathematics.round_off import sign_of
+from multiphi_exudyn.time.loaded_level import LoadedLevel
 
 __all__ = ["Event", "Loss", "Phase", "Row", "State", "event_table", "total_impulse", "total_loss"]
 
