@@ -8,7 +8,7 @@ help of the command line, start at once.
 
 Every room imports only from rooms before it in this order, and so do the files of a room.
 
-Order: errors, version, display, files, mathematics, mechanics, levels, events, time, steady, public, exudyn_plugin,
+Order: errors, version, display, files, mathematics, mechanics, levels, time, steady, public, exudyn_plugin,
 study, cli, __main__.
 """
 

@@ -78,10 +78,151 @@ class Element:
 
     def __init__(self, *, kind: Kind, links: Sequence[int], states: Sequence[ElementState], stiffness: float, restitution: float, limit: float, static_limit: float, friction: float, static_friction: float, knots: tuple[int, int, int], stick: tuple[int, int, float, float]) -> None: ...
 
-class Model:
-    """The coordinates that all levels share, and the elements."""
+class Base:
+    """The coordinates that all levels share, and the links in them."""
 
-    def __init__(self, *, elements: Sequence[Element], squares: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], damping: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], directions: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], force_directions: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], gaps: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], stiffnesses: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], dampings: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], preload: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], energy_offset: float, held: Sequence[int], oblique: Sequence[int], general: bool, residual: Sequence[int], roughest_first: Sequence[int], is_complete: bool, knots: int) -> None: ...
+    def __init__(self, *, squares: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], rigid_body_modes: int, damping: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], directions: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], force_directions: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], stiffnesses: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], dampings: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], preload: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], energy_offset: float, held: Sequence[int], oblique: Sequence[int], residual: Sequence[int], general: bool, parallel: Sequence[int], points: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], names: Sequence[str], labels: Sequence[str]) -> None: ...
+
+    def are_independent(self, rigid: Sequence[int]) -> bool: ...
+
+    @property
+    def orientation(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+def static_response(base: Base, closed: Sequence[int], gaps: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], load: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]]:
+    """
+    Forces (k,) of closed links and y (m,) in response to their gaps (k,) and a load (m,), without friction.
+    """
+
+class ModalLevel:
+    """The modes of a set of closed links, without friction."""
+
+    @property
+    def links(self) -> tuple: ...
+
+    @property
+    def kept_beyond(self) -> int: ...
+
+    @property
+    def vibrates(self) -> bool: ...
+
+    @property
+    def squares(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+    @property
+    def computed(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+    @property
+    def shapes(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def inertial(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def damping(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def gaps(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def following(self) -> list[bool]: ...
+
+    def static_shares(self, count: int) -> dict[int, float]:
+        """
+        By the first link of each spring, the share of its flexibility that modes beyond the first ones have.
+        """
+
+class MovingLevel:
+    """The modes of a set of closed links, with friction of those that slide."""
+
+    def __init__(self, base: Base, links: Sequence[int], kept: KeptModes) -> None: ...
+
+    @property
+    def modal(self) -> ModalLevel: ...
+
+    @property
+    def forces(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def force_rates(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def coupling(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def damping_matrix(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    def asymptotic(self, load: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], gaps: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]) -> Asymptotic: ...
+
+    def deflection(self, load: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], gaps: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]]:
+        """
+        Forces (k,) of the closed links and y (m,) in response to a load (m,) and gaps (k,).
+        """
+
+class KeptModes:
+    """Which modes levels keep: the lowest ones, up to a frequency [Hz]."""
+
+    def __init__(self, most: int | None = None, highest: float = float('inf')) -> None: ...
+
+class Asymptotic:
+    """Static response of a level to gaps and a static load."""
+
+    @property
+    def configuration(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+    @property
+    def gaps(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+    @property
+    def forces(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+    @property
+    def drive(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+    @property
+    def load(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+    @property
+    def strain(self) -> float: ...
+
+    @property
+    def potential(self) -> float: ...
+
+class ResidualBoundary:
+    """Residual contacts, and what their forces bend beside modes."""
+
+    @property
+    def flexibility(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def compliances(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+class ModalLevels:
+    """The levels of a model, built on first use."""
+
+    def __init__(self, base: Base, most: int | None, highest: float, measured: Sequence[tuple[Sequence[int], Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')] | None, Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')] | None]]) -> None:
+        """
+        most, highest: which modes levels keep. measured: frequencies [Hz] and damping ratios by closed links.
+        """
+
+    def level(self, links: Sequence[int]) -> MovingLevel: ...
+
+    def boundary(self, host: Sequence[int]) -> ResidualBoundary: ...
+
+    def set_most(self, most: int) -> None: ...
+
+    @property
+    def built(self) -> int: ...
+
+    @property
+    def count(self) -> int: ...
+
+    @property
+    def highest_frequency(self) -> float: ...
+
+class Model:
+    """The elements, and the levels that they have."""
+
+    def __init__(self, *, levels: ModalLevels, gaps: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], elements: Sequence[Element], roughest_first: Sequence[int], is_complete: bool, knots: int) -> None: ...
 
     @property
     def size(self) -> int: ...
@@ -98,7 +239,7 @@ class Model:
 class Excitation:
     """functions: (breaks, rates, coefficients) of the prescribed channels."""
 
-    def __init__(self, *, static_load: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], patterns: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], stops: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], functions: Sequence[tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], Annotated[NDArray[numpy.complex128], dict(shape=(None,), order='C')], Annotated[NDArray[numpy.complex128], dict(shape=(None, None), order='C')]]], start: float, until: float, highest_frequency: float, is_isolated: bool) -> None: ...
+    def __init__(self, *, static_load: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], patterns: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], stops: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], functions: Sequence[tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], Annotated[NDArray[numpy.complex128], dict(shape=(None,), order='C')], Annotated[NDArray[numpy.complex128], dict(shape=(None, None), order='C')]]], start: float, until: float, highest_frequency: float, is_isolated: bool, rate_of: Sequence[int], steady: int) -> None: ...
 
     @property
     def channels(self) -> int: ...
@@ -208,11 +349,6 @@ class Guard:
     @property
     def by_velocity(self) -> VelocityTarget | None: ...
 
-class LevelData:
-    """What levels/ computes of a level, in base coordinates and in xi."""
-
-    def __init__(self, *, key: Sequence[int], links: Sequence[int], squares: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], computed: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], damping_matrix: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], coupling: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], damping: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], modes: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], bending: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], configuration: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], drive: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], static_drive: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], load: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], strain: float, stored: float, gap_rows: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], gap_constants: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], velocity_rows: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], force_rows: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], force_velocity_rows: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], forces: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], channel_force: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], channel_force_rate: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], channel_shapes: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], carried: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], mobility: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')] | None = None, duration: float) -> None: ...
-
 class PotentialForm:
     @property
     def constant(self) -> float: ...
@@ -257,6 +393,45 @@ class Level:
     def highest_frequency(self) -> float: ...
 
     @property
+    def links(self) -> tuple: ...
+
+    @property
+    def squares(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+    @property
+    def computed(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+    @property
+    def damping_matrix(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def damping(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def coupling(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def shapes(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def configuration(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+    @property
+    def drive(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+    @property
+    def static_drive(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+    @property
+    def load(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+    @property
+    def static_strain(self) -> float: ...
+
+    @property
+    def stored(self) -> float: ...
+
+    @property
     def gap_rows(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
 
     @property
@@ -264,6 +439,30 @@ class Level:
 
     @property
     def velocity_rows(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def force_rows(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def force_velocity_rows(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def forces(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
+    @property
+    def channel_force(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def channel_force_rate(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def channel_shapes(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def carried(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def response(self) -> ModalResponse: ...
 
     @property
     def displacement_acceleration(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
@@ -290,9 +489,6 @@ class Level:
     @property
     def patterns(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
 
-    @property
-    def carried(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
-
     def response_sizes(self, part: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
 
     @property
@@ -316,6 +512,8 @@ class Level:
 class Transition:
     """A state expressed in the coordinates of the next level."""
 
+    def __init__(self, source: Level, target: Level) -> None: ...
+
     @property
     def matrix(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
 
@@ -331,12 +529,23 @@ class Transition:
     @property
     def start_sizes(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
 
-class Levels:
-    """
-    The levels of a model under its loads, built on first use by a function of the states.
-    """
+class DefectForm:
+    """Maps of (1, xi, s) and (xi', s') to what a level entered cannot hold."""
 
-    def __init__(self, model: Model, excitation: Excitation, builder: Callable) -> None: ...
+    def __init__(self, transition: Transition, stopped: Sequence[int]) -> None:
+        """stopped: links along which an impact has left no velocity."""
+
+    @property
+    def displaced(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def moving(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+class Levels:
+    """The levels of a model under its loads, built on first use."""
+
+    def __init__(self, model: Model, excitation: Excitation, duration: float = float('inf')) -> None:
+        """duration: of the longest motion [s]."""
 
     @property
     def model(self) -> Model: ...
@@ -360,7 +569,7 @@ class HeldLevels(Levels):
     The levels of a model under constant forces that others hold for a step.
     """
 
-    def __init__(self, model: Model, excitation: Excitation, builder: Callable) -> None: ...
+    def __init__(self, model: Model, excitation: Excitation, duration: float = float('inf')) -> None: ...
 
     def set_forces(self, forces: Callable, inertia: tuple[Callable, Callable] | None = None) -> None:
         """
@@ -377,50 +586,25 @@ def energies(level: Level, displacement: Annotated[NDArray[numpy.float64], dict(
 def losses(left: Level, displacement: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], velocity: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], entered: Level, displacement_after: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], velocity_after: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], collided: float) -> tuple[float, float, float, float, float, float]:
     """Energies [J] that a change of level takes."""
 
-MOVES: float = 1e-05
-
 def clusters(squares: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]) -> list[tuple[int, int]]:
     """The first and one past the last of equal omega^2 (r,)."""
 
-def signs(modes: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], rows: Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)], sizes: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]:
+def cluster_end(squares: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], count: int) -> int | None:
     """
-    Signs (r,) that make the first value of each mode (r, m) in rows (k, m) positive.
+    The least number of modes >= count that parts no cluster; None where the last omega^2 are one.
     """
+
+def aligned_modes(squares: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], modes: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], rows: Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)], sizes: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]]:
+    """
+    omega^2 (r,), modes (r, m) and values of rows (k, r) with unique signs and bases of clusters.
+    """
+
+def jacobi_singular_values(matrix: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]]:
+    """Singular values ascending (n,), right vectors (n, n)."""
 
 def rank_one_modes(d: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], p: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], stiffness: float, count: int, most_steps: int = 100) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]] | None:
     """
     The lowest eigenvalues (count,) and vectors (count, m) of diag(d) + k p p^T; None if there are fewer.
-    """
-
-def residual_modes(squares: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], gaps: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], flexibility: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], compliances: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]]:
-    """
-    omega^2 (r,), their modes (r, r) in those of the host, and the forces (k, r) of contacts that act through the flexibility of the modes left out.
-    """
-
-class LevelRows:
-    """Gaps, damping and contact forces from the modes of a level."""
-
-    @property
-    def modes(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
-
-    @property
-    def damping(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
-
-    @property
-    def gaps(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
-
-    @property
-    def forces(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
-
-    @property
-    def force_rates(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
-
-    @property
-    def following(self) -> Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C')]: ...
-
-def level_rows(observed: Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)], sizes: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)], squares_of_base: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)], restoring: Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)], closed: Sequence[int], rigid: Sequence[int], squares: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], modes: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], damped: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], gaps: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], damping: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]) -> LevelRows:
-    """
-    The rows of a level of omega^2 (r,) and modes (r, m) of any sign, from C psi (r, m), gaps and D.
     """
 
 def without(directions: Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)], vectors: Annotated[NDArray[numpy.float64], dict(shape=(None, None), writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]:
@@ -870,8 +1054,8 @@ class BatchRun:
     @property
     def is_complete(self) -> bool: ...
 
-def run_batch(levels: Levels, starts: Sequence[Start], window: int, allowed: float, time: float, end: float, threads: int) -> list[BatchRun]:
-    """Runs from many starts on several threads."""
+def run_batch(levels: Sequence[Levels], starts: Sequence[Start], window: int, allowed: float, time: float, end: float, threads: int) -> list[BatchRun]:
+    """Many runs on several threads, each in its levels from its start."""
 
 class Sampler:
     """Values of a recorded motion at any times."""

@@ -22,7 +22,6 @@ struct Base {
     Matrix damping;                 // C (m, m) [1/s]
     Matrix directions;              // h of every link (l, m)
     Matrix force_directions;        // along which the links' forces act (l, m); h for most links
-    Vector gaps;                    // (l,) [m] at y = 0
     Vector stiffnesses, dampings;   // (l,) [N/m], infinite if rigid; [N s/m]
     Vector preload;                 // (m,) constant forces of force laws
     double energy_offset = 0.0;     // [J] of the links at y = 0

@@ -23,11 +23,11 @@ void for_each(int count, int threads, const Function& function) {
 
 }  // namespace
 
-std::vector<BatchRun> run_batch(const std::shared_ptr<Levels>& levels, const std::vector<Start>& starts,
+std::vector<BatchRun> run_batch(const std::vector<std::shared_ptr<Levels>>& levels, const std::vector<Start>& starts,
                                 const Chatter& chatter, double time, double end, int threads) {
     std::vector<BatchRun> results(starts.size());
     for_each(static_cast<int>(starts.size()), threads, [&](int k) {
-        Run run(levels, chatter, time);
+        Run run(levels[static_cast<std::size_t>(k)], chatter, time);
         run.share_levels();
         try {
             run.begin(starts[k]);

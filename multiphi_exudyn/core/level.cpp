@@ -71,7 +71,7 @@ Level::Level(const Model& model, const Excitation& excitation)
     data_.squares = data_.computed = base.squares;
     data_.gap_rows.resize(base.links(), n);
     data_.gap_rows << base.directions, -excitation.stops;
-    data_.gap_constants = base.gaps;
+    data_.gap_constants = model.gaps;
     data_.velocity_rows = data_.gap_rows;
     centre_.setZero(m);
     first_guards_.assign(model.elements.size() + 1, 0);

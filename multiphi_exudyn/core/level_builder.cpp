@@ -40,7 +40,7 @@ Matrix beside(const Matrix& left, const Matrix& right) {
 LevelData build_level(const Model& model, const Excitation& excitation, const MovingLevel& moving, const Key& key,
                       double duration) {
     const ModalLevel& modal = moving.modal;
-    Asymptotic rest = moving.asymptotic(whole_load(model, excitation, key));
+    Asymptotic rest = moving.asymptotic(whole_load(model, excitation, key), model.gaps);
     Channels channels(moving, excitation);
     ChannelGaps channel_gaps(modal, excitation, channels);
     LevelData data;

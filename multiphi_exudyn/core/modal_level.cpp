@@ -283,14 +283,14 @@ ModalLevel::Response ModalLevel::neutral_response(const Vector& load, const Vect
     return {along, configuration, driving};
 }
 
-Asymptotic ModalLevel::asymptotic(const Vector& load) const {
+Asymptotic ModalLevel::asymptotic(const Vector& load, const Vector& initial) const {
     const Base& base = *base_;
-    const Response found = response(load + base.preload, base.gaps(links()));
+    const Response found = response(load + base.preload, initial(links()));
     Asymptotic result;
     result.configuration = found.configuration;
     const Vector& y = result.configuration;
-    result.gaps = base.directions * y + base.gaps;
-    const Vector sizes = base.sizes_of_directions * y.cwiseAbs() + base.gaps.cwiseAbs();
+    result.gaps = base.directions * y + initial;
+    const Vector sizes = base.sizes_of_directions * y.cwiseAbs() + initial.cwiseAbs();
     for (int link = 0; link < base.links(); ++link) {
         const double negligible = following[static_cast<std::size_t>(link)] ? round_off::following : round_off::zero;
         if (!(std::abs(result.gaps[link]) > negligible * sizes[link])) result.gaps[link] = 0.0;

@@ -62,7 +62,7 @@ class ModalLevel {
     bool vibrates() const { return vibrates_; }       // no mode has zero frequency
     bool has_neutral_modes() const { return neutral_.rows() > 0; }
 
-    Asymptotic asymptotic(const Vector& load) const;
+    Asymptotic asymptotic(const Vector& load, const Vector& gaps) const;  // gaps (l,) of all links at y = 0
     Deflection deflection(const Vector& load, const Vector& gaps) const;  // gaps (k,) of the closed links
     // The force (r,) that `deflection` leaves on zero-frequency modes, zero on the others.
     Vector driving_force(const Vector& load, const Vector& gaps) const;

@@ -7,9 +7,9 @@
 
 namespace multiphi {
 
-Model::Model(std::shared_ptr<ModalLevels> given, std::vector<Element> all, std::vector<int> roughest, bool complete,
-             int knot_count)
-    : levels(std::move(given)), base(*levels->base()), elements(std::move(all)), roughest_first(std::move(roughest)),
+Model::Model(std::shared_ptr<ModalLevels> given, Vector initial, std::vector<Element> all, std::vector<int> roughest,
+             bool complete, int knot_count)
+    : levels(std::move(given)), base(*levels->base()), gaps(std::move(initial)), elements(std::move(all)), roughest_first(std::move(roughest)),
       is_complete(complete), knots(knot_count), unit_directions(base.directions) {
     for (int link = 0; link < base.links(); ++link) {
         if (base.sizes[link] > 0.0) unit_directions.row(link) /= base.sizes[link];

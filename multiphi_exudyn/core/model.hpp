@@ -17,6 +17,7 @@ class ModalLevels;
 struct Model {
     std::shared_ptr<ModalLevels> levels;
     const Base& base;                 // of these levels
+    Vector gaps;                      // of all links (l,) [m] at y = 0; models that differ in them share their levels
     std::vector<Element> elements;
     std::vector<int> roughest_first;  // elements by friction at rigid contacts: of redundant ones the first carries
     bool is_complete;                 // its levels keep all modes, so no truncation is to be judged
@@ -26,8 +27,8 @@ struct Model {
     Matrix unit_directions;           // (l, m)
     bool has_friction;                // or further links: an impulse may have another direction than its contact
 
-    Model(std::shared_ptr<ModalLevels> levels, std::vector<Element> elements, std::vector<int> roughest_first,
-          bool is_complete, int knots);
+    Model(std::shared_ptr<ModalLevels> levels, Vector gaps, std::vector<Element> elements,
+          std::vector<int> roughest_first, bool is_complete, int knots);
     Model(const Model&) = delete;
 
     int size() const { return static_cast<int>(elements.size()); }

@@ -128,8 +128,8 @@ Vector Sliding::friction(const Vector& forces) const {
     return added_.transpose() * solve(remaining, Matrix(forces(places_)));
 }
 
-Asymptotic Sliding::asymptotic(const Vector& load) const {
-    return level_->asymptotic(load + friction(level_->asymptotic(load).forces));
+Asymptotic Sliding::asymptotic(const Vector& load, const Vector& gaps) const {
+    return level_->asymptotic(load + friction(level_->asymptotic(load, gaps).forces), gaps);
 }
 
 Deflection Sliding::deflection(const Vector& load, const Vector& gaps) const {
@@ -162,8 +162,8 @@ Matrix MovingLevel::damping_matrix() const {
     return sliding ? Matrix(modal.damping + sliding->damping()) : modal.damping;
 }
 
-Asymptotic MovingLevel::asymptotic(const Vector& load) const {
-    return sliding ? sliding->asymptotic(load) : modal.asymptotic(load);
+Asymptotic MovingLevel::asymptotic(const Vector& load, const Vector& gaps) const {
+    return sliding ? sliding->asymptotic(load, gaps) : modal.asymptotic(load, gaps);
 }
 
 Deflection MovingLevel::deflection(const Vector& load, const Vector& gaps) const {

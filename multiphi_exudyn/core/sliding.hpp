@@ -42,7 +42,7 @@ class Sliding {
     Matrix answered(const Matrix& forces) const;
 
     // As of the level without friction.
-    Asymptotic asymptotic(const Vector& load) const;
+    Asymptotic asymptotic(const Vector& load, const Vector& gaps) const;  // gaps (l,) of all links at y = 0
     Deflection deflection(const Vector& load, const Vector& gaps) const;
     Vector driving_force(const Vector& load, const Vector& gaps) const;
 
@@ -72,7 +72,7 @@ struct MovingLevel {
     const Matrix& force_rates() const { return sliding ? sliding->force_rates() : modal.force_rates; }
     Matrix coupling() const;        // S - diag(omega^2) (r, r),
     Matrix damping_matrix() const;  //   and D with what friction adds
-    Asymptotic asymptotic(const Vector& load) const;
+    Asymptotic asymptotic(const Vector& load, const Vector& gaps) const;  // gaps (l,) of all links at y = 0
     Deflection deflection(const Vector& load, const Vector& gaps) const;
     Vector driving_force(const Vector& load, const Vector& gaps) const;
 

@@ -48,6 +48,7 @@ def _made(model: MultiPhiModel) -> core.Model:
     rough = np.array([_coefficients(element) for element in model.contacts]).reshape(-1, 2)
     return core.Model(
         levels=model.modal_levels,
+        gaps=base.gaps,
         elements=elements,
         roughest_first=np.lexsort((-rough[:, 0], -rough[:, 1])).tolist(),
         is_complete=model.whole,

@@ -75,7 +75,7 @@ class LevelWithChannels(Level):
             modal.closed,
             modal.kept_beyond,
         )
-        q = channels.force.shape[1]
+        self._modal, q = modal, channels.force.shape[1]
         self.squares = np.concatenate([modal.squares, np.zeros(q)])
         self.computed = np.concatenate([modal.computed, np.zeros(q)])
         self.vectors = np.hstack([modal.vectors, channels.shapes])
@@ -87,6 +87,11 @@ class LevelWithChannels(Level):
 
     def __getstate__(self) -> dict[str, Any]:
         return dict(vars(self))
+
+    @property
+    def static_shares(self) -> dict[str, float]:  # type: ignore[override]
+        """Those of the level without channels."""
+        return self._modal.static_shares
 
 
 class LoadedLevel(Shown):

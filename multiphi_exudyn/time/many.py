@@ -1,9 +1,9 @@
-"""Many runs of one model that differ in their starts alone, on all cores.
+"""Many runs on all cores: of one model from many starts, or of models and loads that differ in numbers.
 
-The core advances a batch of runs at a time on its threads; levels are built once, for all. Every run is the same, to
-the bit, as a run alone, for any number of threads. Only the requested samples of a run are kept.
-
-What a run needs of Python, its start before it and its warnings after it, is done by one thread.
+The core advances a batch of runs at a time on its threads. What a run needs of Python, its start before it and its
+warnings after it, is done by one thread. Levels are built once for all starts; models that differ in gaps share the
+modes of their levels, and have a static response each. Every run is the same, to the bit, as a run alone, for any
+number of threads. Only what is asked for of a run is kept.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from dataclasses import fields as fields_of
 from functools import partial
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiVal
 from multiphi_exudyn.levels.model.mode_choice import Tolerance, is_count
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
-from multiphi_exudyn.mechanics.arguments import no_text, real_array
+from multiphi_exudyn.mechanics.arguments import is_real, no_text, real_array
 from multiphi_exudyn.mechanics.loads import Load
 from multiphi_exudyn.mechanics.structure import At
 from multiphi_exudyn.time.excitation import Excitation
@@ -33,11 +34,15 @@ from multiphi_exudyn.time.simulate import Run, checked_end, holding, refined, ru
 from multiphi_exudyn.time.start import Start, Starts
 from multiphi_exudyn.time.trajectory import Trajectory
 
-__all__ = ["ManyRuns", "StartVectors", "Task", "simulate_many"]
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+__all__ = ["ManyGiven", "ManyRuns", "StartVectors", "Task", "simulate_many"]
 
 BAR_DELAY = 2.0  # s before a progress bar appears
 KEPT = 8  # sets of levels under loads, one for each fineness of interpolation
 BATCH = 64  # runs of a batch, for each thread: a progress bar then moves
+MADE = 2048  # runs with numbers of their own that are kept, more than a batch has
 MOST_SEGMENTS = 2**20  # of a batch: they are kept in memory until its results have been read
 
 StartVectors: TypeAlias = "tuple[np.ndarray | None, np.ndarray | None]"  # x and x' (n,)
@@ -51,10 +56,18 @@ class ManyRuns:
     ----------
     points : tuple (p,)
         As they were given.
+    contacts : tuple (c,)
+        As they were given.
     times : array (t,)
         [s].
     samples : array (k, p, t)
         Displacements of the points [m] at the times, NaN after the failure of a run.
+    forces : array (k, c, t)
+        Forces of the contacts [N] at the times, NaN after the failure of a run.
+    impulses : array (k, c)
+        Integrals of the forces over each run [N s], impulses of impacts included.
+    contact_times : array (k, c)
+        How long each contact is closed [s].
     events : array (k,)
         Number of events of each run.
     ends : array (k,)
@@ -65,16 +78,42 @@ class ManyRuns:
         The causes.
     warnings : tuple of tuple of str
         What to distrust in each.
+    varied : dict of str to array (k,)
+        The numbers in which the runs differ, as they were given.
     """
 
     points: tuple[At, ...]
+    contacts: tuple[str, ...]
     times: np.ndarray
     samples: np.ndarray
+    forces: np.ndarray
+    impulses: np.ndarray
+    contact_times: np.ndarray
     events: np.ndarray
     ends: np.ndarray
     status: tuple[str, ...]
     messages: tuple[str, ...]
     warnings: tuple[tuple[str, ...], ...]
+    varied: dict[str, np.ndarray]
+
+    def to_dataframe(self) -> DataFrame:
+        """A pandas table, a row for each run.
+
+        Columns: the numbers varied, "status", "events", "end" [s], for every point "peak NAME" [m], the largest
+        |displacement| at the times, and for every contact "peak force NAME" [N] at the times, "impulse NAME" [N s] and
+        "closed NAME" [s].
+        """
+        from pandas import DataFrame
+
+        columns: dict[str, Any] = {**self.varied, "status": self.status, "events": self.events, "end": self.ends}
+        for place, point in enumerate(self.points):
+            name = point if isinstance(point, str) else f"point {place}"
+            columns[f"peak {name}"] = np.max(np.abs(self.samples[:, place]), axis=1)
+        for place, name in enumerate(self.contacts):
+            columns[f"peak force {name}"] = np.max(self.forces[:, place], axis=1)
+            columns[f"impulse {name}"] = self.impulses[:, place]
+            columns[f"closed {name}"] = self.contact_times[:, place]
+        return DataFrame(columns)
 
 
 def simulate_many(
@@ -86,8 +125,10 @@ def simulate_many(
     points: Sequence[At] = (),
     times: np.ndarray | None = None,
     threads: int | None = None,
+    vary: Mapping[str, np.ndarray] | None = None,
+    contacts: Sequence[str] = (),
 ) -> ManyRuns:
-    """Runs of one model from many starts; each gives what ``simulate`` gives, to the bit.
+    """Many runs: from many starts, or with other gaps, stiffnesses, loads; each is what ``simulate`` gives, to the bit.
 
     Parameters
     ----------
@@ -95,8 +136,9 @@ def simulate_many(
         Structure, contacts and modes.
     t_end : float
         End of every run [s].
-    displacements, velocities : array (k, n), default None
-        x [m, rad] and x' [m/s, rad/s] at t = 0, None for zero; one of them is needed.
+    displacements, velocities : array (k, n) or (n,), default None
+        x [m, rad] and x' [m/s, rad/s] at t = 0 of each run, or of all; None for zero. Without ``vary`` one of them is
+        needed.
     loads : sequence of loads, default ()
         Of all runs, as of ``simulate``.
     points : sequence of str, mapping or array (n,), default ()
@@ -105,12 +147,18 @@ def simulate_many(
         At which they are [s], None for the end alone.
     threads : int, default None
         Number of threads, without effect on the answer. None for the number of cores.
+    vary : mapping of str to array (k,), default None
+        Numbers in which the runs differ: "NAME.FIELD" of a contact, friction or force law, such as "stop.gap",
+        "stop.stiffness" or "ring.limit", and "loads.I.FIELD" of the I-th load, such as "loads.0.amplitude". Runs whose
+        gaps or loads differ share the modes of their levels.
+    contacts : sequence of str, default ()
+        Names of contacts whose forces are sampled, with their impulses and contact times.
 
     Returns
     -------
     ManyRuns
-        Samples, events and warnings of each. A run that fails, or whose start is refused, is a status of its row.
-        Warnings are issued by their kinds, with the numbers of the runs.
+        Samples, events and warnings of each; ``to_dataframe`` is a table of them. A run that fails, or whose start is
+        refused, is a status of its row. Warnings are issued by their kinds, with the numbers of the runs.
 
     Raises
     ------
@@ -130,36 +178,120 @@ def simulate_many(
     >>> runs = mp.simulate_many(model, 0.5, velocities=speeds, points=["tip"])
     >>> runs.samples.shape, set(runs.status)
     ((100, 1, 1), {'ok'})
+    >>> gaps = np.linspace(0.5e-3, 2e-3, 4)
+    >>> runs = mp.simulate_many(model, 0.5, velocities=speeds[-1], contacts=["stop"], vary={"stop.gap": gaps})
+    >>> runs.to_dataframe()["impulse stop"].round(2).tolist() == [round(float(p), 2) for p in runs.impulses[:, 0]]
+    True
     """
     from tqdm import tqdm
 
-    end, starts = checked_end(model, t_end), _starts(model, displacements, velocities)
+    end, starts = checked_end(model, t_end), _starts(model, displacements, velocities, _count(vary))
     no_text("points", points)
+    no_text("contacts", contacts)
     wider = holding(model, loads)
     rows = [(isinstance(point, (str, Mapping)), model.structure.row(point)) for point in points]
     outside = [sentence for named, row in rows if not named for sentence in row_warnings(wider, row)]
     Excitation.of(wider, loads, end)  # refuses loads that are wrong for all runs
-    given = Run(wider, end, loads=loads)
-    task = Task(given, starts, [row for _, row in rows], _times(times, end))
+    for name in contacts:
+        model.index(name)
+    runs = ManyGiven(Run(wider, end, loads=loads), starts, vary or {})
+    task = Task(runs, [row for _, row in rows], contacts, _times(times, end))
     with tqdm(total=len(starts), unit="run", disable=None, leave=False, delay=BAR_DELAY) as bar:
         task.carry_out(_checked(threads), bar)
     status, messages, warnings = zip(*task.results, strict=True)
     groups = grouped((str(number), sentences) for number, sentences in enumerate(warnings))
     issue((*outside, *(group.told(len(starts)) for group in groups)))
-    return ManyRuns(tuple(points), task.times, task.samples, task.events, task.ends, status, messages, warnings)
+    return ManyRuns(
+        points=tuple(points),
+        contacts=tuple(contacts),
+        times=task.times,
+        samples=task.samples,
+        forces=task.forces,
+        impulses=task.impulses,
+        contact_times=task.contact_times,
+        events=task.events,
+        ends=task.ends,
+        status=status,
+        messages=messages,
+        warnings=warnings,
+        varied={name: np.asarray(values) for name, values in (vary or {}).items()},
+    )
 
 
-def _starts(model: MultiPhiModel, displacements: Any, velocities: Any) -> list[StartVectors]:
-    """x and x' of every start."""
+def _count(vary: Any) -> int | None:
+    """The number of runs that ``vary`` asks for, None without it."""
+    if not vary:
+        return None
+    if not isinstance(vary, Mapping):
+        raise MultiPhiTypeError(f"vary: got {type(vary).__name__}, need a mapping such as {{'stop.gap': array}}")
+    lengths = {name: np.shape(real_array(f"vary {name!r}", values, "a (k,) array")) for name, values in vary.items()}
+    shapes = set(lengths.values())
+    if len(shapes) > 1 or len(shape := shapes.pop()) != 1 or not shape[0]:
+        raise MultiPhiValueError(f"vary: got shapes {lengths}, need arrays (k,), k the same for all")
+    return int(shape[0])
+
+
+class ManyGiven(Sequence[Run]):
+    """The runs as they are given, each made when it is asked for: ``run`` with its start and its numbers of ``vary``.
+
+    differ: whether they have other models or loads. An error names what is not there, or not possible.
+    """
+
+    def __init__(self, run: Run, starts: Sequence[StartVectors], vary: Mapping[str, np.ndarray]) -> None:
+        self._run, self._starts = run, starts
+        self._fields = [(_place(run, name), np.asarray(values, float)) for name, values in vary.items()]
+        self.differ = bool(vary)
+        self._made = BoundedCache[int, Run](MADE)
+
+    def __len__(self) -> int:
+        return len(self._starts)
+
+    def __getitem__(self, number: int) -> Run:  # type: ignore[override]
+        return self._made.get_or_build(number, lambda: self._make(number))
+
+    def _make(self, number: int) -> Run:
+        x, x_t = self._starts[number]
+        model, loads = self._run.model, self._run.loads
+        contacts, varied_loads = list(model.contacts), list(loads)
+        for (of_load, index, field), values in self._fields:
+            items: list[Any] = varied_loads if of_load else contacts
+            items[index] = replace(items[index], **{field: float(values[number])})
+        if any(not of_load for (of_load, _, _), _ in self._fields):
+            model = replace(model, contacts=contacts)
+        if any(of_load for (of_load, _, _), _ in self._fields):
+            loads = tuple(varied_loads)
+        return replace(self._run, model=model, loads=loads, displacement=x, velocity=x_t)
+
+
+def _place(run: Run, name: str) -> tuple[bool, int, str]:
+    """Whether a name is that of a load's number, its place among the loads or contacts, and its field."""
+    owner, _, field = str(name).rpartition(".")
+    prefix, _, number = owner.rpartition(".")
+    of_load = prefix == "loads" and number.isdigit() and owner not in {contact.name for contact in run.model.contacts}
+    if of_load and int(number) >= len(run.loads):
+        raise MultiPhiValueError(f"vary: got {name!r}, need the number of a load, 0 to {len(run.loads) - 1}")
+    index = int(number) if of_load else run.model.index(owner)
+    item: Any = run.loads[index] if of_load else run.model.contacts[index]
+    known = [each.name for each in fields_of(item) if is_real(getattr(item, each.name))]
+    if field not in known:
+        raise MultiPhiValueError(f"vary: got {name!r}, need a number of it: {', '.join(known)}")
+    return of_load, index, field
+
+
+def _starts(model: MultiPhiModel, displacements: Any, velocities: Any, count: int | None) -> list[StartVectors]:
+    """x and x' of every start, of ``count`` runs where it is given."""
     n, needed = model.structure.n, "a (k, n) array of real numbers"
     given = {"displacements": displacements, "velocities": velocities}
     arrays = {name: real_array(name, values, needed) for name, values in given.items() if values is not None}
-    if not arrays:
+    if not arrays and count is None:
         raise MultiPhiTypeError(f"displacements: got None, and no velocities, need {needed}")
-    count = len(next(iter(arrays.values())))
+    if count is None:
+        count = len(next(iter(arrays.values())))
+    else:
+        arrays = {name: np.tile(values, (count, 1)) if values.ndim == 1 else values for name, values in arrays.items()}
     for name, values in arrays.items():
         if values.ndim != 2 or values.shape != (count, n) or not count:
-            raise MultiPhiValueError(f"{name}: got shape {values.shape}, need (k, {n}), k the same for both")
+            raise MultiPhiValueError(f"{name}: got shape {values.shape}, need (k, {n}), k the same for all")
     none = [None] * count
     return list(zip(arrays.get("displacements", none), arrays.get("velocities", none), strict=True))
 
@@ -183,25 +315,28 @@ def _checked(threads: int | None) -> int:
 
 
 class Task:
-    """Runs to be done, and their results; given: the run that they have in common; points: rows (n,).
+    """Runs to be done, and their results; points: rows (n,); contacts: names.
 
-    samples, events, ends: see ManyRuns. results: status, message and warnings of each run.
+    samples, forces, impulses, contact_times, events, ends: see ManyRuns. results: status, message and warnings of each.
     """
 
     def __init__(
-        self, given: Run, starts: Sequence[StartVectors], points: Sequence[np.ndarray], times: np.ndarray
+        self, runs: ManyGiven, points: Sequence[np.ndarray], contacts: Sequence[str], times: np.ndarray
     ) -> None:
-        self._given, self._starts, self._points, self.times = given, starts, points, times
+        self._runs, self._points, self._contacts, self.times = runs, points, contacts, times
+        count, shape = len(runs), (len(runs), len(contacts))
+        self.samples = np.full((count, len(points), len(times)), np.nan)
+        self.forces, self.impulses, self.contact_times = np.full((*shape, len(times)), np.nan), *np.zeros((2, *shape))
+        self.ends, self.events = np.zeros(count), np.zeros(count, int)
+        self.results = [("failed", "", tuple[str, ...]())] * count
         self._kept = BoundedCache[object, LoadedLevels](KEPT)
-        count = len(starts)
-        self.samples, self.ends = np.full((count, len(points), len(times)), np.nan), np.zeros(count)
-        self.events, self.results = np.zeros(count, int), [("failed", "", tuple[str, ...]())] * count
+        self._rules = BoundedCache[int, Starts](KEPT)
 
     def carry_out(self, threads: int, bar: Any) -> None:
         """Do all runs; the first ones, one after the other, decide the modes of a Tolerance."""
-        model, numbers = self._given.model, list(range(len(self._starts)))
-        alone = len(numbers) if refined(self._given.loads) else 1  # a first run sets the size of batches
-        while numbers and (alone > 0 or (isinstance(model.modes, Tolerance) and model.decided is None)):
+        numbers = list(range(len(self._runs)))
+        alone = len(numbers) if refined(self._runs[0].loads) else 1  # a first run sets the size of batches
+        while numbers and (alone > 0 or self._is_undecided(numbers[0])):
             segments = self._finish(numbers.pop(0), None)
             alone -= 1
             bar.update()
@@ -211,32 +346,47 @@ class Task:
             segments = self._run_batch(batch, threads)
             bar.update(len(batch))
 
+    def _is_undecided(self, number: int) -> bool:
+        model = self._runs[number].model
+        return isinstance(model.modes, Tolerance) and model.decided is None
+
+    def _run(self, number: int) -> Run:
+        """A run, with what it shares with the others."""
+        return replace(self._runs[number], shared=self._kept if not self._runs.differ else None)
+
     def _run_batch(self, numbers: Sequence[int], threads: int) -> int:
         """Do a batch of runs; return the largest number of segments of one."""
-        given, end = self._given, self._given.t_end
-        levels = replace(given, model=given.model.decided or given.model, shared=self._kept).levels()
-        waiting, starts, rule = list[int](), list[Start](), Starts(levels, end)
+        waiting, starts, levels = list[int](), list[Start](), list[LoadedLevels]()
         for number in numbers:
+            run = self._run(number)
             try:
-                starts.append(rule.first(*self._starts[number]))
+                own = replace(run, model=run.model.decided or run.model).levels()
+                starts.append(self._rule(own).first(run.displacement, run.velocity))
+                levels.append(own)
                 waiting.append(number)
             except MultiPhiError as error:
                 self.results[number] = "failed", str(error), ()
-        built, window = levels.in_core, limits(levels.model)
-        given_starts = [core_start(levels, start) for start in starts]
-        runs = core.run_batch(built, given_starts, *window, levels.drive.time, end, threads)
         largest = 0
-        for k, run in enumerate(runs):
-            ahead = Motion.ended(levels, built, starts[k], run) if run.is_complete else None
+        if not waiting:
+            return largest
+        built = [each.in_core for each in levels]
+        given = [core_start(own, start) for own, start in zip(levels, starts, strict=True)]
+        end, window = self._runs[0].t_end, limits(levels[0].model)
+        for k, run in enumerate(core.run_batch(built, given, *window, levels[0].drive.time, end, threads)):
+            ahead = Motion.ended(levels[k], built[k], starts[k], run) if run.is_complete else None
             largest = max(largest, self._finish(waiting[k], ahead))
         return largest
 
+    def _rule(self, levels: LoadedLevels) -> Starts:
+        if self._runs.differ:
+            return Starts(levels, self._runs[0].t_end)
+        rule: Starts = self._rules.get_or_build(id(levels), lambda: Starts(levels, self._runs[0].t_end))
+        return rule
+
     def _finish(self, number: int, ahead: Motion | None) -> int:
         """Keep the results of a run, done alone unless it is ``ahead``; return its number of segments."""
-        x, x_t = self._starts[number]
-        run = replace(self._given, displacement=x, velocity=x_t, shared=self._kept, ahead=ahead)
         try:
-            trajectory = run_with_warnings(run)
+            trajectory = run_with_warnings(replace(self._run(number), ahead=ahead))
         except MultiPhiError as error:
             self.results[number] = "failed", str(error), ()
             return 0
@@ -247,11 +397,18 @@ class Task:
 
     def _sample(self, number: int, trajectory: Trajectory) -> None:
         reached = self.times <= trajectory.t_end
-        if not (trajectory.segments and reached.any()):
+        if not trajectory.segments:
+            return
+        for place, name in enumerate(self._contacts):
+            self.impulses[number, place] = trajectory.contact_impulse(name, 0.0, trajectory.t_end)
+            self.contact_times[number, place] = np.sum(np.diff(trajectory.contact_intervals(name), axis=1))
+        if not reached.any():
             return
         segments, times = trajectory.segments, self.times[reached]
         for place, row in enumerate(self._rows_of(trajectory.model)):
             self.samples[number, place, reached] = segments.values(times, "right", partial(point_row, row))
+        for place, name in enumerate(self._contacts):
+            self.forces[number, place, reached] = trajectory.contact_force(name, times)
 
     def _rows_of(self, model: MultiPhiModel) -> list[np.ndarray]:
         """Rows (m,) of the points in the base coordinates of a run's final model."""

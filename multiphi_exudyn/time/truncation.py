@@ -23,8 +23,8 @@ difference to the truncated state after it is the defect
 
 in the displacement norm of the mass matrix: w / Omega is the displacement that a lost velocity would have become in the
 open level, to which it comes back. At the start it is the static residual of the starting configuration. From level to
-level d and w / Omega are linear in the state before and in the changes beside the map of the levels (core/defect_form.hpp);
-the triangular factors of these maps are kept, a few numbers per pair of levels.
+level d and w / Omega are linear in the state before and in the changes beside the map of the levels
+(core/defect_form.hpp); the triangular factors of these maps are kept, a few numbers per pair of levels.
 """
 
 from __future__ import annotations

@@ -100,7 +100,8 @@ class TestLevel:
             near(level.displacement_acceleration, np.hstack([-stiffness, loaded.channels.force]))
             near(level.velocity_acceleration, np.hstack([-modal.damping_matrix, loaded.channels.force_rate]))
             near(level.omega[modal.squares > 0], np.sqrt(modal.squares[modal.squares > 0]))
-            assert level.drives_free_modes == loaded.driven
+            held = loaded.channels.force[:, loaded.excitation.prescribed :]
+            assert level.drives_free_modes == (loaded.driven or bool(np.any(held)))
 
     def test_has_the_gaps_of_its_configuration(self, case):
         """h.y + gap - s w of every link, y = Psi eta + y_inf + R w."""
@@ -219,13 +220,24 @@ class TestEnergies:
             size = self.size(before, states[0][0]) + self.size(after, states[1][0])
             near(got, [0.0, kinetic, strain, 0.0, damped, dropped], size)
 
+    @staticmethod
+    def acting(model, element, state):
+        """Links of an element that act in a state."""
+        return [model.link_indices[element][k] for k in model.contacts[element].states[state].holds]
+
     def springs(self, level, x, source, target):
         """Energies of the springs of viscous contacts that open or close, and of friction that begins to slip."""
         gaps, model = level.level.gap_rows @ x + level.gap_constants, level.level.base
         damped = dropped = 0.0
         for i, element in enumerate(model.contacts):
             changes = (source[i] == 0) - (target[i] == 0)
-            if element.damping and not element.held:
+            if getattr(element, "damper", None) == "bounded":
+                stored = [
+                    sum(0.5 * model.links[k].stiffness * gaps[k] ** 2 for k in self.acting(model, i, states[i]))
+                    for states in (source, target)
+                ]
+                damped += stored[0] - stored[1] if source[i] and target[i] else 0.0
+            elif element.damping and not element.held:
                 damped -= changes * 0.5 * element.stiffness * gaps[i] ** 2
             links = [k for k in model.link_indices[i] if model.links[k].held]
             if links and math.isfinite(model.links[links[0]].stiffness):

@@ -1,5 +1,6 @@
 """Many runs at once are each what they are alone, to the bit, however many threads there are."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -138,3 +139,69 @@ class TestSeveralRunsTogether:
 def test_bad_input_is_refused(refused, kind, changes, begins):
     given = {"model": model("all"), "t_end": END, "displacements": np.zeros((3, 6))}
     refused(kind, begins, mp.simulate_many, **(given | changes))
+
+
+class TestVariedNumbers:
+    """Each run is that of its own model under its own loads, to the bit."""
+
+    LOADS = (mp.HarmonicLoad("m1", 0.3, 0.2),)
+
+    def own(self, given, gap, stiffness, amplitude):
+        first, other = given.contacts
+        changed = [dataclasses.replace(first, gap=gap, stiffness=stiffness), other]
+        x = np.full(6, 0.2)
+        loads = [dataclasses.replace(self.LOADS[0], amplitude=amplitude)]
+        with kept_back():
+            return mp.simulate(mp.MultiPhiModel(given.structure, changed, modes=4), END, displacement=x, loads=loads)
+
+    @pytest.mark.filterwarnings("ignore::multiphi_exudyn.MultiPhiWarning")
+    @pytest.mark.parametrize("stiffnesses", [np.full(5, 50.0), np.linspace(20.0, 90.0, 5)], ids=["gaps", "stiffness"])
+    def test_of_contacts_and_loads(self, stiffnesses):
+        given, gaps, amplitudes = model(stiffness=50.0), np.linspace(0.05, 0.15, 5), np.linspace(0.1, 0.5, 5)
+        vary = {"stop.gap": gaps, "stop.stiffness": stiffnesses, "loads.0.amplitude": amplitudes}
+        found = mp.simulate_many(
+            given,
+            END,
+            displacements=np.full(6, 0.2),
+            loads=self.LOADS,
+            points=["m5"],
+            times=TIMES,
+            vary=vary,
+            contacts=["stop"],
+            threads=2,
+        )
+        table = found.to_dataframe()
+        for k, numbers in enumerate(zip(gaps, stiffnesses, amplitudes, strict=True)):
+            run = self.own(given, *numbers)
+            assert_array_equal(found.samples[k, 0], run.at("m5", TIMES))
+            assert_array_equal(found.forces[k, 0], run.contact_force("stop", TIMES))
+            assert found.impulses[k, 0] == run.contact_impulse("stop", 0.0, END)
+            assert found.contact_times[k, 0] == sum(b - a for a, b in run.contact_intervals("stop"))
+            assert table["events"][k] == len(run.events)
+            assert table["stop.gap"][k] == gaps[k]
+        assert set(found.status) == {"ok"}
+
+    def test_other_gaps_take_the_levels_that_there_are(self):
+        given = model(stiffness=50.0)
+        mp.simulate(given, END, displacement=np.full(6, 0.2))
+        first, other = given.contacts
+        changed = dataclasses.replace(given, contacts=[dataclasses.replace(first, gap=0.11), other])
+        built = changed.levels_built
+        mp.simulate(changed, END, displacement=np.full(6, 0.2))
+        assert changed.modal_levels is given.modal_levels
+        assert changed.levels_built == given.levels_built >= built
+
+    @pytest.mark.parametrize(
+        ("vary", "told"),
+        [
+            ({"stop.gap": np.ones((2, 2))}, "need arrays"),
+            ({"stop.gap": np.ones(2), "above.gap": np.ones(3)}, "k the same for all"),
+            ({"stop.name": np.ones(2)}, "need a number of it: gap"),
+            ({"tap.gap": np.ones(2)}, "'tap'"),
+            ({"loads.1.amplitude": np.ones(2)}, "need the number of a load, 0 to 0"),
+            (["stop.gap"], "need a mapping"),
+        ],
+    )
+    def test_refusals_name_what_was_given(self, vary, told):
+        with pytest.raises(mp.MultiPhiError, match=told):
+            mp.simulate_many(model(), END, loads=self.LOADS, vary=vary)

@@ -26,7 +26,7 @@ HEAVY = {
         "multiphi_exudyn/levels/level/level.py",
         "multiphi_exudyn/time/histories.py",
     ),
-    "pandas": ("multiphi_exudyn/study", "multiphi_exudyn/time/histories.py"),
+    "pandas": ("multiphi_exudyn/time/many.py", "multiphi_exudyn/study", "multiphi_exudyn/time/histories.py"),
     "distributed": ("multiphi_exudyn/study/sweep.py",),
     "tqdm": (*(f"multiphi_exudyn/{room}" for room in ("mathematics", "time", "study", "cli")), "reference_models"),
     "h5py": ("multiphi_exudyn/mechanics/files.py",),

@@ -81,5 +81,7 @@ class TestContacts:
 
     def test_force_laws_and_friction_need_supports(self, refused):
         m = mp.MultiPhiModel(structure(), [mp.Friction("ring", "mid", 1.0)])
-        begins = "static equilibrium: the structure is free (1 rigid-body modes) and has force laws or friction"
+        begins = (
+            "static equilibrium: the structure is free (1 rigid-body modes) and has force laws, friction or bounded"
+        )
         refused(ValueError, begins, m.static_equilibrium, {"left": -5.0, "right": 5.0})

@@ -80,11 +80,11 @@ class TestFewModesOfALevel:
         level = bed(math.inf).level(("c3", "c20"))
         assert np.abs(level.base.directions[:, level.indices].T @ level.vectors).max() < 1e-14
 
-    def test_fewer_are_taken_from_them_and_more_are_built(self):
+    def test_fewer_and_more_are_the_lowest_of_the_same(self):
         some = bed(math.inf)
         held = some.level(("c3",))
         fewer = dataclasses.replace(some, modes=3)
-        assert np.shares_memory(fewer.level(("c3",)).vectors, held.vectors)
+        assert_allclose(fewer.level(("c3",)).vectors, held.vectors[:, :3], atol=SUBSPACES)
         more = dataclasses.replace(some, modes="all")
         assert more.level(("c3",)).modes == some.base.modes.count - 1
         assert_allclose(more.level(("c3",)).omega[:12], held.omega, rtol=FREQUENCIES)

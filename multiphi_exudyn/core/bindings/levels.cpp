@@ -179,7 +179,6 @@ void bind_level(nb::module_& module) {
         .def("opening", &Level::opening, "element"_a, nb::rv_policy::reference_internal)
         .def_prop_ro("potential", &Level::potential, nb::rv_policy::reference_internal)
         .def_prop_ro("patterns", &Level::patterns, nb::rv_policy::copy)
-        .def_prop_ro("carried", &Level::carried, nb::rv_policy::copy)
         .def("response_sizes", &Level::response_sizes, "part"_a, nb::rv_policy::copy)
         .def_prop_ro("rates", [](const Level& level) { return as_vector(level.response().basis.rates); })
         .def(

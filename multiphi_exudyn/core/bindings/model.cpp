@@ -62,7 +62,7 @@ void make_element(Element* self, Kind kind, std::vector<int> links, std::vector<
 using MeasuredModes = std::vector<std::tuple<std::vector<int>, std::optional<Vector>, std::optional<Vector>>>;
 
 void make_base(Base* self, Vector squares, int rigid_body_modes, Matrix damping, Matrix directions,
-               Matrix force_directions, Vector gaps, Vector stiffnesses, Vector dampings, Vector preload,
+               Matrix force_directions, Vector stiffnesses, Vector dampings, Vector preload,
                double energy_offset, std::vector<int> held, std::vector<int> oblique, std::vector<int> residual,
                bool general, std::vector<int> parallel, Matrix points, std::vector<std::string> names, std::vector<std::string> labels) {
     new (self) Base{};
@@ -71,7 +71,6 @@ void make_base(Base* self, Vector squares, int rigid_body_modes, Matrix damping,
     self->damping = std::move(damping);
     self->directions = std::move(directions);
     self->force_directions = std::move(force_directions);
-    self->gaps = std::move(gaps);
     self->stiffnesses = std::move(stiffnesses);
     self->dampings = std::move(dampings);
     self->preload = std::move(preload);
@@ -158,7 +157,7 @@ void bind_model(nb::module_& module) {
     bind_elements(module);
     nb::class_<Base>(module, "Base", "The coordinates that all levels share, and the links in them.")
         .def("__init__", make_base, nb::kw_only(), "squares"_a, "rigid_body_modes"_a, "damping"_a, "directions"_a,
-             "force_directions"_a, "gaps"_a, "stiffnesses"_a, "dampings"_a, "preload"_a, "energy_offset"_a, "held"_a,
+             "force_directions"_a, "stiffnesses"_a, "dampings"_a, "preload"_a, "energy_offset"_a, "held"_a,
              "oblique"_a, "residual"_a, "general"_a, "parallel"_a, "points"_a, "names"_a, "labels"_a)
         .def("are_independent", &Base::are_independent, "rigid"_a)
         .def_prop_ro("orientation", [](const Base& base) { return Vector(base.orientation); });
@@ -192,7 +191,7 @@ void bind_model(nb::module_& module) {
         .def_prop_ro("force_rates", [](const MovingLevel& level) { return level.force_rates(); })
         .def_prop_ro("coupling", &MovingLevel::coupling)
         .def_prop_ro("damping_matrix", &MovingLevel::damping_matrix)
-        .def("asymptotic", &MovingLevel::asymptotic, "load"_a)
+        .def("asymptotic", &MovingLevel::asymptotic, "load"_a, "gaps"_a)
         .def(
             "deflection",
             [](const MovingLevel& level, const Vector& load, const Vector& gaps) {
@@ -236,8 +235,8 @@ void bind_model(nb::module_& module) {
         .def_prop_ro("count", &ModalLevels::count)
         .def_prop_ro("highest_frequency", &ModalLevels::highest_frequency);
     nb::class_<Model>(module, "Model", "The elements, and the levels that they have.")
-        .def(nb::init<std::shared_ptr<ModalLevels>, std::vector<Element>, std::vector<int>, bool, int>(), nb::kw_only(),
-             "levels"_a, "elements"_a, "roughest_first"_a, "is_complete"_a, "knots"_a)
+        .def(nb::init<std::shared_ptr<ModalLevels>, Vector, std::vector<Element>, std::vector<int>, bool, int>(),
+             nb::kw_only(), "levels"_a, "gaps"_a, "elements"_a, "roughest_first"_a, "is_complete"_a, "knots"_a)
         .def_prop_ro("size", &Model::size)
         .def_prop_ro("modes", [](const Model& model) { return model.base.modes(); })
         .def_prop_ro("unit_directions", [](const Model& model) { return Matrix(model.unit_directions); })

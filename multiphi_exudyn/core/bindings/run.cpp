@@ -305,13 +305,14 @@ void bind_run(nb::module_& module) {
         .def_ro("is_complete", &BatchRun::is_complete);
     module.def(
         "run_batch",
-        [](const std::shared_ptr<Levels>& levels, const std::vector<Start>& starts, int window, double allowed,
-           double time, double end, int threads) {
+        [](const std::vector<std::shared_ptr<Levels>>& levels, const std::vector<Start>& starts, int window,
+           double allowed, double time, double end, int threads) {
+            if (levels.size() != starts.size()) throw std::invalid_argument("levels: need those of every start");
             const nb::gil_scoped_release released;
             return run_batch(levels, starts, Chatter(window, allowed), time, end, threads);
         },
         "levels"_a, "starts"_a, "window"_a, "allowed"_a, "time"_a, "end"_a, "threads"_a,
-        "Runs from many starts on several threads.");
+        "Many runs on several threads, each in its levels from its start.");
 }
 
 }  // namespace multiphi::bindings

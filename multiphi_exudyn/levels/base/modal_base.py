@@ -32,6 +32,16 @@ from multiphi_exudyn.mechanics.element_table import ElementTable
 __all__ = ["ModalBase", "parallel"]
 
 PARALLEL = 1e-14  # of the largest component: directions that differ by less differ by round-off
+WITHOUT_GAPS = (  # what does not depend on the gaps of contacts
+    "core_base",
+    "energy_offset",
+    "lengths",
+    "periods",
+    "preload",
+    "projection",
+    "squares",
+    "unmoved",
+)
 NEARLY_PARALLEL = 1 - 1e-6  # cosine of two directions that are compared closely
 
 
@@ -117,7 +127,6 @@ class ModalBase(ElementTable, Shown):
             damping=self.damping,
             directions=self.directions.T,
             force_directions=self.pushes.T,
-            gaps=self.gaps,
             stiffnesses=self.stiffnesses,
             dampings=self.dampings,
             preload=self.preload,
@@ -131,6 +140,12 @@ class ModalBase(ElementTable, Shown):
             names=["" if i in self.laws else link.name for i, link in enumerate(self.links)],
             labels=self.labels,
         )
+
+    def with_gaps_of(self, contacts: Sequence[Element]) -> ModalBase:
+        """Return this base for contacts that differ from its own in their gaps alone."""
+        other = dataclasses.replace(self, contacts=tuple(contacts))
+        vars(other).update({name: value for name, value in vars(self).items() if name in WITHOUT_GAPS})
+        return other
 
     def __getstate__(self) -> dict[str, Any]:
         return {key: value for key, value in vars(self).items() if key != "core_base"}  # a copy makes its own

@@ -199,7 +199,7 @@ class Level(Shown):
 
     def asymptotic(self, load: np.ndarray) -> core.Asymptotic:
         """Return the static response to a load (m,) in base coordinates and to the constant forces of force laws."""
-        return self._of_core.asymptotic(load)
+        return self._of_core.asymptotic(load, self.base.gaps)
 
     def static_response(self, load: np.ndarray, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return contact forces (k,) and y (m,) in response to a static load (m,) and gaps (k,) of closed contacts."""

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Callable, Hashable, Sequence
 from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
 
+import multiphi_exudyn._core as core
 from multiphi_exudyn.levels.base.build_base import COMPLETE, build_base
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.model.mode_choice import FIRST
 from multiphi_exudyn.mathematics.blas_threads import one_blas_thread
 from multiphi_exudyn.mathematics.lowest_modes import missing_flexibility
+from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
-__all__ = ["LevelStore"]
+__all__ = ["LevelStore", "differ_in_gaps"]
 
 CACHE_BYTES = 2**30  # of the cached levels of a model, with their data: 1 GiB, which leaves room on a laptop
 FEWEST_LEVELS = 8  # cached whatever their size: a run that alternates between them would else rebuild them
@@ -40,12 +43,29 @@ class LevelStore:
         self.narrow: Any = None
         self._previous_base: ModalBase | None = None
         self._missing: dict[bytes, float] = {}
+        self._made: dict[Hashable, core.ModalLevels] = {}  # by what modes they keep
+        self._lent: dict[Hashable, core.ModalLevels] = {}
         if earlier is not None and earlier.structure is structure:
             self.load_rows, self.narrow, self._previous_base = (
                 earlier.load_rows,
                 earlier.narrow,
                 earlier.base or earlier._previous_base,
             )
+
+    def borrow(self, other: LevelStore) -> None:
+        """Use the base and the levels of a store whose contacts differ in their gaps alone."""
+        assert other.base is not None, "there is nothing to borrow"
+        self.first, self.chosen, self.base = other.first, other.chosen, other.base.with_gaps_of(self.contacts)
+        self._lent = {**other._lent, **other._made}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_made": {}, "_lent": {}}  # a copy builds its own
+
+    def levels_of(self, kept: Hashable, make: Callable[[], core.ModalLevels]) -> core.ModalLevels:
+        """Return the levels in the core, those of a model with other gaps if it has some that keep the same modes."""
+        levels = self._lent.get(kept) or make()
+        self._made[kept] = levels
+        return levels
 
     def built_base(self, modes: int | None) -> ModalBase:
         """Return the base, built on first use for levels with so many modes, None for all."""
@@ -76,3 +96,17 @@ class LevelStore:
             shares = missing_flexibility(self.structure.mass, self.structure.stiffness, base.modes, row[None, :])
             self._missing[key] = float(shares[0])
         return self._missing[key]
+
+
+def differ_in_gaps(some: Sequence[Element], others: Sequence[Element]) -> bool:
+    """Return whether the elements of two models are the same but for the gaps of contacts."""
+    return len(some) == len(others) and all(map(_alike_but_gap, some, others))
+
+
+def _alike_but_gap(one: Element, other: Element) -> bool:
+    if one is other:
+        return True
+    if not isinstance(one, UnilateralContact) or type(one) is not type(other):
+        return False
+    names = [field.name for field in dataclasses.fields(one) if field.name != "gap"]
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)

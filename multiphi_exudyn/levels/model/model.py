@@ -141,8 +141,11 @@ class MultiPhiModel(SharedBase, Shown):
         object.__setattr__(
             self, "overrides", {tuple(self.contacts[i].name for i in key): value for key, value in ordered.items()}
         )
+        earlier = self._store
         if not self._can_share():
-            self._new_store()
+            store = self._new_store()
+            if earlier is not None and self._differs_in_gaps_from(earlier):
+                store.borrow(earlier)
 
     def push(self, states: Sequence[int]) -> np.ndarray:
         """Return the load (m,) of the constant forces of elements in these states."""
@@ -208,6 +211,12 @@ class MultiPhiModel(SharedBase, Shown):
     @functools.cached_property
     def modal_levels(self) -> core.ModalLevels:
         """The levels in the core, each built on first use."""
+        if self.overrides:
+            return self._new_modal_levels()
+        kept = self.most_modes, getattr(self.modes, "frequency", None)
+        return self._shared_store.levels_of(kept, self._new_modal_levels)
+
+    def _new_modal_levels(self) -> core.ModalLevels:
         highest = self.modes.frequency if isinstance(self.modes, UpTo) else math.inf
         measured = [(list(self.links_named(closed)), *given.arrays) for closed, given in self.overrides.items()]
         levels = core.ModalLevels(self.base.core_base, self.most_modes, highest, measured)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from multiphi_exudyn.levels.base.modal_base import ModalBase
-from multiphi_exudyn.levels.model.level_store import LevelStore
+from multiphi_exudyn.levels.model.level_store import LevelStore, differ_in_gaps
 from multiphi_exudyn.levels.model.mode_choice import SMALL, TRIED, Tolerance, UpTo, choose_mode_count
 from multiphi_exudyn.mechanics.element_table import ElementTable
 from multiphi_exudyn.mechanics.structure import LinearStructure
@@ -94,6 +94,14 @@ class SharedBase(ElementTable):
         """Return the share of the static flexibility at a row (n,) that the base does not represent."""
         _ = self.base
         return self._shared_store.outside(row)
+
+    def _differs_in_gaps_from(self, store: LevelStore) -> bool:
+        """Return whether this model can use what a store has for contacts with other gaps."""
+        if store.structure is not self.structure or store.base is None or store.contacts == self.contacts:
+            return False
+        if not differ_in_gaps(self.contacts, store.contacts):
+            return False
+        return self.modes is None or store.serves(self.most_modes)
 
     def _can_share(self) -> bool:
         """Return whether this model can use the levels that its store has for another number of modes."""
