@@ -8,10 +8,26 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from small_structures import chain, random_model, stop
 
-from multiphi_exudyn import ConstantLoad, MultiPhiModel, simulate
+from multiphi_exudyn import ConstantLoad, MultiPhiModel, RayleighDamping, simulate
 
 SOFT = 40.0
 LOAD = -0.7
+
+
+@pytest.fixture(scope="module", name="run")
+def bouncing_chain():
+    """Five masses over a rigid and a compliant stop, damped, under a constant load: both kinds close and open."""
+    structure = chain(5, damping=RayleighDamping(0.02, 1e-3))
+    contacts = [stop("m2", 0.2), stop("m4", 0.4, SOFT, "soft")]
+    run = simulate(
+        MultiPhiModel(structure, contacts, modes="all"),
+        20.0,
+        displacement=np.linspace(0, 2, 5),
+        loads=[ConstantLoad("m3", LOAD)],
+    )
+    assert run.status == "ok"
+    assert {event.contact for event in run.events if event.kind == "open"} == {"stop", "soft"}
+    return run
 
 
 def first(run, contact, kind):

@@ -1,6 +1,7 @@
 """Exponentials: their derivatives, integrals and later starts, of motions with any damping."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -18,6 +19,38 @@ def by_response(response, coefficients, t):
 
 def start(r, seed=1):
     return np.random.default_rng(seed).normal(size=(2, r))
+
+
+def diagonal(omega, ratios):
+    return np.diag(2 * np.asarray(ratios) * omega)
+
+
+OMEGA = np.array([3.0, 7.0, 11.0])
+REGIMES = {
+    "undamped": (OMEGA, np.zeros((3, 3))),
+    "underdamped": (OMEGA, diagonal(OMEGA, [0.01, 0.2, 0.9])),
+    "critical": (OMEGA, diagonal(OMEGA, [1.0, 1.0, 1.0])),
+    "nearly critical": (OMEGA, diagonal(OMEGA, [1 - 1e-6, 1 + 1e-7, 1 + 4e-5])),
+    "edge of nearly critical": (OMEGA, diagonal(OMEGA, [1 - 4.9e-5, 1 - 5.1e-5, 1 + 5.1e-5])),
+    "overdamped": (OMEGA, diagonal(OMEGA, [1.1, 5.0, 300.0])),
+    "zero frequency": (np.array([0.0, 0.0, 5.0]), np.diag([0.0, 2.0, 0.3])),
+    "coupled": (OMEGA, np.array([[0.5, 0.3, 0.1], [0.3, 1.0, 0.4], [0.1, 0.4, 0.8]])),
+    "coupled overdamped": (OMEGA, np.array([[90.0, 60.0, 5.0], [60.0, 80.0, 4.0], [5.0, 4.0, 70.0]])),
+    "coupled zero frequency": (np.array([0.0, 4.0, 9.0]), np.array([[1.0, 0.5, 0.2], [0.5, 1.0, 0.1], [0.2, 0.1, 2]])),
+    "coupled beside undamped zero frequency": (
+        np.array([0.0, 4.0, 9.0]),
+        np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.4], [0.0, 0.4, 2.0]]),
+    ),
+    "two coupled zero frequencies": (
+        np.array([0.0, 0.0, 9.0]),
+        np.array([[1.0, 0.5, 0.2], [0.5, 1.0, 0.1], [0.2, 0.1, 2.0]]),
+    ),
+}  # fmt: skip
+
+
+@pytest.fixture(params=REGIMES, name="regime")
+def each_regime(request):
+    return REGIMES[request.param]
 
 
 class TestExponentials:
@@ -47,6 +80,13 @@ class TestExponentials:
             parts = np.linspace(0, duration, 9)[1:-1]
             exact, _ = quad_vec(response.basis.at, 0, duration, epsabs=1e-13, points=parts)
             assert_allclose(response.basis.integrals(duration), exact, rtol=1e-10, atol=1e-13)
+
+    def test_evaluates_many_times_at_once(self, regime):
+        (omega, damping), times = regime, np.array([0.0, 0.2, 1.0])
+        basis = modal_response(omega**2, damping).basis
+        together = basis.at(times)
+        assert together.shape == (3, len(basis.rates))
+        assert_allclose(together, [basis.at(float(t)) for t in times], rtol=1e-15)
 
 
 class TestExponentialIntegrals:
