@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, fields
+from typing import Any
 
 from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.mechanics.contact import UnilateralContact
@@ -47,5 +48,5 @@ class ResidualContact(UnilateralContact):
         return ElementState("open", "open", (closing,)), ElementState("closed", "close", (opening,), holds=(0,))
 
 
-def _arguments(contact: UnilateralContact) -> dict[str, object]:
+def _arguments(contact: UnilateralContact) -> dict[str, Any]:
     return {field.name: getattr(contact, field.name) for field in fields(UnilateralContact)}

@@ -340,7 +340,9 @@ def long_motions(setup: Setup, names: Sequence[str]) -> tuple[Course, ...]:
     low_pass = scipy.signal.butter(4, np.sqrt(first * second), fs=1 / file.outputs.interval, output="sos")
     found = []
     for name in names:
-        model = setup.model(setup.scene.models[name])
+        spec = setup.scene.models[name]
+        assert isinstance(spec, ReducedModel), "the names are those of reduced models"
+        model = setup.model(spec)
         with kept_back():
             run = simulate(model, time[-1], start=start_equilibrium(setup, model))
         if run.status == "ok":

@@ -544,7 +544,7 @@ def long_figure(courses: Sequence[Course]) -> Figure:
     """Motion long after the release, and how far its phase is ahead of the open structure's first mode."""
     figure, (motion, phase) = panels([3.0, 3.0], sharex=True)
     for k, course in enumerate(courses):
-        style = {"color": COLOURS[k], "lw": WIDEST - 0.8 * k}
+        style: dict[str, Any] = {"color": COLOURS[k], "lw": WIDEST - 0.8 * k}
         motion.plot(course.time, 1e3 * course.displacement, **style, label=course.label)
         phase.plot(course.crossings, course.phase, **style, label=course.label)
         phase.axvline(course.last, color=COLOURS[k], ls=":", lw=1)

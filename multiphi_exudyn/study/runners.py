@@ -138,7 +138,8 @@ class Runner(ABC):
         if not run.ok:
             return run
         histories, sampling_s = timed(lambda: self.histories(prepared, answer))
-        complete = replace(run, **{"time": self.setup.time, "sampling_s": sampling_s} | histories)
+        sampled: dict[str, Any] = {"time": self.setup.time, "sampling_s": sampling_s} | histories
+        complete = replace(run, **sampled)
         cause = _energy_gain(complete) if self.may_gain_energy else ""
         return replace(run, status="failed", message=cause) if cause else complete
 

@@ -89,7 +89,7 @@ class LevelWithChannels(Level):
         return dict(vars(self))
 
     @property
-    def static_shares(self) -> dict[str, float]:  # type: ignore[override]
+    def static_shares(self) -> dict[str, float]:
         """Those of the level without channels."""
         return self._modal.static_shares
 

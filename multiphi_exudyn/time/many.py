@@ -372,8 +372,8 @@ class Task:
         built = [each.in_core for each in levels]
         given = [core_start(own, start) for own, start in zip(levels, starts, strict=True)]
         end, window = self._runs[0].t_end, limits(levels[0].model)
-        for k, run in enumerate(core.run_batch(built, given, *window, levels[0].drive.time, end, threads)):
-            ahead = Motion.ended(levels[k], built[k], starts[k], run) if run.is_complete else None
+        for k, done in enumerate(core.run_batch(built, given, *window, levels[0].drive.time, end, threads)):
+            ahead = Motion.ended(levels[k], built[k], starts[k], done) if done.is_complete else None
             largest = max(largest, self._finish(waiting[k], ahead))
         return largest
 

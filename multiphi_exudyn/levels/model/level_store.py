@@ -108,5 +108,5 @@ def _alike_but_gap(one: Element, other: Element) -> bool:
         return True
     if not isinstance(one, UnilateralContact) or type(one) is not type(other):
         return False
-    names = [field.name for field in dataclasses.fields(one) if field.name != "gap"]
+    names = [field.name for field in dataclasses.fields(UnilateralContact) if field.name != "gap"]
     return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)

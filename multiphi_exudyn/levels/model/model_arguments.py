@@ -63,8 +63,9 @@ def _check_names(boundary: Mapping[Any, Any], contacts: Sequence[Element]) -> No
 
 
 def _can_be_residual(element: Element) -> bool:
-    is_contact = isinstance(element, UnilateralContact)
-    return is_contact and not (element.damping or element.most or element.restitution)
+    if not isinstance(element, UnilateralContact):
+        return False
+    return not (element.damping or element.most or element.restitution)
 
 
 def _on_boundary(element: Element, boundary: str, required: bool) -> Element:
