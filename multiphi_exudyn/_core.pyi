@@ -1057,6 +1057,84 @@ class BatchRun:
 def run_batch(levels: Sequence[Levels], starts: Sequence[Start], window: int, allowed: float, time: float, end: float, threads: int) -> list[BatchRun]:
     """Many runs on several threads, each in its levels from its start."""
 
+def solve_constrained(mass: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], jacobian: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], forces: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], prescribed: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]:
+    """a and mu of M a + C^T mu = f, C a = g; redundant constraints share mu."""
+
+class AttachedParts:
+    """Masses and constraints attached to points of a body."""
+
+    def __init__(self, mass: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], jacobian: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], first: int, own_mass: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], points: Sequence[int]) -> None: ...
+
+    @property
+    def acts_on_body(self) -> bool: ...
+
+    @property
+    def connected(self) -> list[int]: ...
+
+    @property
+    def inertia(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+    @property
+    def free(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]: ...
+
+class PointInertia:
+    """Inertia attached to points of the structure."""
+
+    def __init__(self, mass: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], free: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], in_base: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]) -> None: ...
+
+    def impedance(self, rows: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]:
+        """X (m, m) for rows (m, r) of the points."""
+
+class SolverLevel:
+    """A level as a solver integrates it, with the points of the body."""
+
+    def __init__(self, *, equation: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], drive: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], rates: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], difference: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], velocity_inverse: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], physical: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], from_velocity: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], rows: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], offset: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], held_offset: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], reactions: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], push: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], rubbing: Sequence[int], rubbing_forces: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]) -> None: ...
+
+class RepeatedStep:
+    """Result of a step that has been computed again."""
+
+    @property
+    def state(self) -> StepState: ...
+
+    @property
+    def has_changed(self) -> bool: ...
+
+    @property
+    def largest_energy(self) -> float: ...
+
+    @property
+    def energy(self) -> float: ...
+
+    @property
+    def driven(self) -> int: ...
+
+    @property
+    def is_unresolved(self) -> bool: ...
+
+    @property
+    def event_time(self) -> float: ...
+
+class CoupledStep:
+    """Computes steps of another solver again, exactly."""
+
+    def __init__(self, *, levels: HeldLevels, window: int, allowed: float, time: float, displacement: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')], velocity: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')], acceleration: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')], multipliers: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu')], first: int, points: Sequence[int], ties: Sequence[int], in_base: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], has_varying_loads: bool, has_friction: bool, has_rigid: bool) -> None: ...
+
+    def repeat(self, system: object, start: float, end: float, x_start: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], state: StepState, largest_energy: float, load_jumps: bool) -> RepeatedStep | Failure:
+        """
+        Compute the step again whose end the system has reached, and write its result; a failure is returned.
+        """
+
+    def take_events(self) -> list[tuple[float, int, int, int, float, list[float]]]:
+        """
+        Time, element, states entered and left, impulse and losses of new events.
+        """
+
+    @property
+    def time(self) -> float: ...
+
+    @property
+    def key(self) -> tuple: ...
+
 class Sampler:
     """Values of a recorded motion at any times."""
 

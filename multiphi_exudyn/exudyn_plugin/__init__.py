@@ -4,13 +4,13 @@ On import the Create function is also bound to Exudyn's systems, as ``mbs.Create
 checks what the bodies need of the solver.
 
 Order: items, system, contacts, timed, matrices, start_state, linear_range, linearize, fem_interface, reduce,
-discretised_level, interface, attached, state, step_test, solver, coupled, alone, body, sensors, drawing, create.
+discretised_level, interface, own_loads, state, step_test, coupled, alone, body, solver, sensors, drawing, create.
 """
 
 from __future__ import annotations
 
 from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
-from multiphi_exudyn.exudyn_plugin.create import CreateMultiPhiBody
+from multiphi_exudyn.exudyn_plugin.create import CreateMultiPhiBody, bind
 from multiphi_exudyn.exudyn_plugin.drawing import Drawing
 from multiphi_exudyn.exudyn_plugin.fem_interface import linear_structure_from_fem
 from multiphi_exudyn.exudyn_plugin.interface import PositionInterface, RigidInterface
@@ -19,7 +19,7 @@ from multiphi_exudyn.exudyn_plugin.linear_range import RangeCheck
 from multiphi_exudyn.exudyn_plugin.linearize import LinearizedStructure, linear_structure_from
 from multiphi_exudyn.exudyn_plugin.reduce import Reduction, reduce
 from multiphi_exudyn.exudyn_plugin.sensors import BodyHistories, body_histories
-from multiphi_exudyn.exudyn_plugin.solver import bind, install_checks
+from multiphi_exudyn.exudyn_plugin.solver import install_checks
 
 __all__ = [
     "BodyHistories",

@@ -1,53 +1,36 @@
-"""Undisturbed steps: many equal steps of the trapezoidal rule at once, for a body on which no other force acts.
+"""Alone: a run of a body on which nothing of the system acts, whose exact motion is computed ahead of Exudyn's steps.
 
-    x_n = T^n x_0,   x = (q, q', q'', 1),   M q'' + D q' + K q = drive  at the end of every step
-
-Exudyn's coordinates are compared with these: a difference means that something else has changed them. The powers T,
-T^2, T^4, ... of a level are kept, so n steps are at most log2(n) + 1 products.
-
-Known motion: the exact motion of a body under its own loads alone, computed before Exudyn's solver reaches it.
-
-The motion is a run of the library (motion.py), computed interval by interval. An interval gives the states at any
-times in it and the events with their times. Where the run fails, the interval ends at the time of the failure.
-
-Event steps: the steps at whose ends the states of a known motion are written into the Exudyn system.
-
-These are the steps in which the level or a phase changes: by an event, or by a request that is refused. With loads that
-vary, every step is one of them. They are planned for steps of equal length h from the end of a step at t on,
+The motion is a run of the library, computed interval by interval. At the ends of event steps, in which the level or a
+phase changes, the exact state is written, with the matrices of its level; between them Exudyn's own steps need nothing
+of the body, which only compares the time with ``next_time``. With loads that vary, every step is an event step. They
+are planned for steps of equal length h from the end of a step at t on,
 
     t_k = t + k h,   k = 0, 1, ...
 
-Each has the exact state at t_k, and the coordinates that Exudyn's own steps reach there from the last event step if
-nothing else changes them. The last step of the plan is added even if nothing is to be written at its end.
+Where a step ends at another time than planned, the plan is made anew, so any step size gives right results. At every
+event step Exudyn's coordinates are compared with those that undisturbed steps give,
 
-Run ahead: a run of an isolated body, whose exact motion is computed ahead of Exudyn's steps.
+    x_n = T^n x_0,   x = (q, q', q'', 1),   M q'' + D q' + K q = drive  at the end of every step,
 
-At the end of an event step (alone.py) the exact state is written, with the matrices of its level. Between event
-steps Exudyn's own steps need nothing of the body; it only compares the time with ``next_time``.
-
-Event steps are planned many steps ahead, for the present step size. Where a step ends at another time than planned, the
-plan is made anew, so any step size gives right results. At every event step Exudyn's coordinates are compared with
-those that undisturbed steps give: if anything else has changed them, the run ends with an error. After a change of the
-step size, which the body sees only at the next event step, every step is checked.
+and if anything else has changed them, the run ends with an error. The powers T, T^2, T^4, ... of a level are kept, so n
+steps are at most log2(n) + 1 products. After a change of the step size, which the body sees only at the next event
+step, every step is checked. Where the run fails, its last interval ends at the time of the failure.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.exudyn_plugin.discretised_level import SteppedLevel
-from multiphi_exudyn.exudyn_plugin.solver import check_matched
-from multiphi_exudyn.exudyn_plugin.state import SAME_STEP, Coordinates, RunRecord
-from multiphi_exudyn.exudyn_plugin.step_test import OwnLoads
+from multiphi_exudyn.exudyn_plugin.discretised_level import DiscretisedLevel
+from multiphi_exudyn.exudyn_plugin.state import SAME_STEP, BodyParts
 from multiphi_exudyn.levels.level.level import Level
-from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.force_law import ForceLaw
 from multiphi_exudyn.time.law_warnings import law_times
 from multiphi_exudyn.time.loaded_level import LoadedLevel
@@ -55,6 +38,8 @@ from multiphi_exudyn.time.loaded_levels import LoadedLevels
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.segments import Segments
 from multiphi_exudyn.time.state import Event, Phase, State
+
+__all__ = ["RunAhead", "UndisturbedSteps"]
 
 PHASES = tuple(Phase)
 TIME_ROUNDING = 1e-9  # of a step: a change this little after the end of a step is counted in it
@@ -71,9 +56,9 @@ class UndisturbedSteps:
     periods: 1 / omega (s,) [s] of its modes, zero for modes of zero frequency.
     """
 
-    def __init__(self, stepped: SteppedLevel, step: float) -> None:
-        self._powers = [_one_step(stepped, step).T]
-        omega, self.periods = stepped.loaded.modal.omega, np.zeros(stepped.size)
+    def __init__(self, discretised: DiscretisedLevel, step: float) -> None:
+        self._powers = [_one_step(discretised, step).T]
+        omega, self.periods = discretised.loaded.modal.omega, np.zeros(discretised.size)
         np.divide(1.0, omega, out=self.periods[: len(omega)], where=omega > 0)
 
     def after(self, states: np.ndarray, counts: np.ndarray) -> np.ndarray:
@@ -88,13 +73,13 @@ class UndisturbedSteps:
         return x[:, :-1].reshape(states.shape)
 
 
-def _one_step(stepped: SteppedLevel, step: float) -> np.ndarray:
+def _one_step(discretised: DiscretisedLevel, step: float) -> np.ndarray:
     """The matrix T (3 s + 1, 3 s + 1) of one step."""
-    s, m, d, k = stepped.size, stepped.mass, stepped.damping, stepped.stiffness
+    s, m, d, k = discretised.size, discretised.mass, discretised.damping, discretised.stiffness
     identity, none, h = np.eye(s), np.zeros((s, s)), step / 2
     q = np.hstack([identity, step * identity, h**2 * identity])
     q_t = np.hstack([none, identity, h * identity])
-    right_side = np.hstack([-d @ q_t - k @ q, stepped.drive[:, None]])
+    right_side = np.hstack([-d @ q_t - k @ q, discretised.drive[:, None]])
     q_tt = np.linalg.solve(m + h * d + h**2 * k, right_side)
     matrix = np.vstack([h**2 * q_tt, h * q_tt, q_tt, np.zeros((1, 3 * s + 1))])
     matrix[:s, : 3 * s] += q
@@ -201,76 +186,8 @@ class MotionInterval:
         return largest
 
 
-class KnownMotion:
-    """The motion ``motion`` from a state and a time [s] on, computed interval by interval."""
-
-    def __init__(self, motion: Motion, state: State, time: float) -> None:
-        self._motion = motion
-        self._continuation = motion.levels.with_channels(state), time
-
-    def advance(self, until: float) -> MotionInterval:
-        """The next interval, up to ``until`` [s]."""
-        motion = self._motion
-        motion.continue_from(*self._continuation)
-        motion.advance(until)
-        self._continuation = motion.state, motion.time
-        times, _, _, truncated = motion.events.table().T
-        segments = motion.record
-        return MotionInterval(
-            end=motion.time,
-            events=motion.events,
-            event_times=times,
-            truncated=truncated,
-            final_state=motion.state,
-            failure=motion.message,
-            segments=segments,
-            phases=segments.start_phases(),
-            static_levels=motion.levels.alone,
-        )
-
-
 def _phase_numbers(phases: Sequence[tuple[Phase, ...]]) -> np.ndarray:
     return np.array([[PHASES.index(phase) for phase in each] for each in phases], dtype=np.int8)
-
-
-StepsOf = Callable[[SteppedLevel], UndisturbedSteps]
-
-
-class IsolatedBody(Protocol):
-    """Attributes of a body that the plan of its event steps needs."""
-
-    name: str
-    model: MultiPhiModel
-    items: dict[str, Any]
-    coordinates: Coordinates
-    matched_step: float | None
-    own_loads: OwnLoads
-
-    @property
-    def varies(self) -> bool:
-        """Whether its loads vary in time."""
-
-    def include_step_error(self, time: float) -> None:
-        """Take notice of the present state, after an event at a time [s]."""
-
-    def stepped_level(self, states: tuple[int, ...]) -> SteppedLevel:
-        """The solver's level in which the elements are in these states."""
-
-
-@dataclass(frozen=True)
-class PlanStart:
-    """The end of a step at ``time`` [s], the ``index``-th of the run, from which steps of length ``step`` [s] follow.
-
-    level, state: those of the Exudyn system there, state (q, q', q'') (3, s). changes_passed: number of changes in the
-    interval of the motion up to this time.
-    """
-
-    time: float
-    index: int
-    step: float
-    level: SteppedLevel
-    state: np.ndarray
-    changes_passed: int
 
 
 @dataclass(frozen=True)
@@ -287,51 +204,11 @@ class EventSteps:
     due_times: list[float]
     indices: list[int]
     changes_passed: list[int]
-    levels: list[SteppedLevel]
+    levels: list[DiscretisedLevel]
     states: np.ndarray
     data: np.ndarray
     expected: np.ndarray
     largest: list[float]
-
-
-def plan_event_steps(
-    body: IsolatedBody, interval: MotionInterval, start: PlanStart, steps_of: StepsOf, count: int, missed: bool = False
-) -> EventSteps:
-    """Plan the event steps within an interval, among the next ``count`` ends of steps, that at the start included.
-
-    missed: whether a change has been missed, which makes the start itself an event step.
-    """
-    last = min(count - 1, math.floor((interval.end - start.time) / start.step + TIME_ROUNDING))
-    change_times = interval.change_times[start.changes_passed :]
-    change_steps = np.ceil((change_times - start.time) / start.step - TIME_ROUNDING)
-    change_steps = np.maximum(change_steps + (start.time + start.step * change_steps < change_times), 0).astype(int)
-    change_times, change_steps = change_times[change_steps <= last], change_steps[change_steps <= last]
-    candidates = np.arange(last + 1) if body.varies else change_steps if not missed else np.append(0, change_steps)
-    first = np.flatnonzero(candidates > np.append(-1, candidates)[:-1])
-    steps = candidates[first]
-    times = start.time + start.step * steps
-    if interval.failure:
-        before_failure = times < interval.end
-        steps, first, times = steps[before_failure], first[before_failure], times[before_failure]
-    due_times = times - TIME_ROUNDING * start.step
-    if not (body.varies or missed):
-        due_times = np.minimum(due_times, change_times[first])
-    levels, level_numbers, states, data = _states(body, interval, times, start.level)
-    if last > (steps[-1] if len(steps) else 0) and not interval.failure:
-        steps, end = np.append(steps, last), start.time + start.step * last
-        times, due_times = np.append(times, end), np.append(due_times, end - TIME_ROUNDING * start.step)
-    expected, largest = _undisturbed(start, steps, levels, level_numbers, states, steps_of)
-    return EventSteps(
-        times=times.tolist(),
-        due_times=due_times.tolist(),
-        indices=(start.index + steps).tolist(),
-        changes_passed=(start.changes_passed + np.searchsorted(change_steps, steps, side="right")).tolist(),
-        levels=[levels[number] for number in level_numbers.tolist()],
-        states=states,
-        data=data,
-        expected=expected,
-        largest=np.maximum.accumulate(largest).tolist(),
-    )
 
 
 def amplitudes(states: np.ndarray, periods: np.ndarray) -> np.ndarray:
@@ -346,74 +223,28 @@ def _largest(rows: np.ndarray) -> np.ndarray:
     return np.asarray(np.max(np.abs(rows), axis=1, initial=0.0))
 
 
-def _states(
-    body: IsolatedBody, interval: MotionInterval, times: np.ndarray, first: SteppedLevel
-) -> tuple[list[SteppedLevel], np.ndarray, np.ndarray, np.ndarray]:
-    """Levels, beginning with ``first``; at times (n,) [s] the number of the level, states (n, 3, s), data (n, width).
-
-    The phases in the data are those with which the level was entered.
-    """
-    layout, count, levels = body.coordinates.layout, len(times), [first]
-    numbers, states, data = np.zeros(count, int), np.empty((count, 3, first.size)), np.zeros((count, layout.width))
-    for part in interval.at(times) if count else ():
-        rows, element_states = part.indices, part.level.states
-        stepped, forces = body.stepped_level(element_states), body.own_loads.forces(element_states, times[rows])
-        states[rows] = stepped.solver_states(part.displacement, part.velocity, forces).reshape(len(rows), 3, -1)
-        data[rows] = layout.rows(element_states, part.phases, part.displacement[:, stepped.modes :])
-        if element_states != first.states:
-            numbers[rows] = len(levels)
-            levels.append(stepped)
-    return levels, numbers, states, data
-
-
-def _undisturbed(
-    start: PlanStart,
-    steps: np.ndarray,
-    levels: list[SteppedLevel],
-    level_numbers: np.ndarray,
-    states: np.ndarray,
-    steps_of: StepsOf,
-) -> tuple[np.ndarray, np.ndarray]:
-    """q (n, s) before each event step, by undisturbed steps from the start or from the event step before it.
-
-    The second array holds the largest amplitude (n,) of the modes on the way.
-    """
-    count, counts = len(steps), np.diff(steps, prepend=0)
-    before = np.concatenate([start.state[None], states])[:count]
-    numbers_before = np.append(0, level_numbers)[:count]
-    q, periods = np.empty((2, count, start.level.size))
-    for number, stepped in enumerate(levels):
-        rows = np.flatnonzero(numbers_before == number)
-        if len(rows):
-            undisturbed = steps_of(stepped)
-            q[rows] = undisturbed.after(before[rows], counts[rows])[:, 0]
-            periods[rows] = undisturbed.periods
-    return q, np.maximum(amplitudes(before, periods), _largest(q))
-
-
 class RunAhead:
     """One run of ``body`` along ``motion``, from time to ``end`` [s] in steps of length ``step`` [s].
 
-    record: of levels and energies, for the warnings. running: until another solver begins. next_time: ``after_step``
+    running: until another solver begins. next_time: ``after_step``
     is to be called at the first end of a step at this time [s] or later. time, index: of its last call.
     """
 
-    def __init__(
-        self, body: IsolatedBody, motion: KnownMotion, record: RunRecord, time: float, step: float, end: float
-    ) -> None:
+    def __init__(self, body: BodyParts, motion: Motion, start: State, time: float, step: float, end: float) -> None:
         coordinates = body.coordinates
         self.running, self.next_time = True, -math.inf
         self.time, self.index = time, 0
-        self._body, self._motion, self._record = body, motion, record
+        self._body, self._motion, self._record = body, motion, body.record
+        self._continuation = motion.levels.with_channels(start), time
         self._step_size, self._rounding, self._end = step, SAME_STEP * step, end
         self._regular = True
         self._state = np.array(coordinates.views)
-        states = coordinates.stepped.states
+        states = coordinates.discretised.states
         self._displacement_scale = body.own_loads.static_levels.further(
-            states, "displacement scale", lambda: _displacement_scale(coordinates.stepped)
+            states, "displacement scale", lambda: _displacement_scale(coordinates.discretised)
         )
         self._past_events, self._truncated = list[Sequence[Event]](), 0.0
-        self._interval = self._motion.advance(self._plan_end(time))
+        self._interval = self._advance(self._plan_end(time))
         self._next = self._changes_passed = 0
         self._steps = self._plan(missed=False)
 
@@ -482,10 +313,10 @@ class RunAhead:
     def _write_state(self, mbs: Any) -> None:
         """Write the exact state at the end of an event step into the system."""
         steps, k, coordinates = self._steps, self._next, self._body.coordinates
-        stepped, self._state = steps.levels[k], steps.states[k]
+        discretised, self._state = steps.levels[k], steps.states[k]
         held = coordinates.layout.held(steps.data[k])
-        coordinates.set_level_if_changed(mbs, stepped, held, stepped.drive)
-        coordinates.write(stepped, held, self._state)
+        coordinates.set_level_if_changed(mbs, discretised, held, discretised.drive)
+        coordinates.write(discretised, held, self._state)
         coordinates.write_level_data(steps.data[k])
         self._body.include_step_error(float(steps.times[k]))
         self._changes_passed, self._next = steps.changes_passed[k], k + 1
@@ -504,11 +335,15 @@ class RunAhead:
         step = (t - self.time) / count
         regular = abs(step - self._step_size) <= self._rounding
         if not regular:
-            check_matched(self._body, step)
+            self._body.check_step(step)
             self._regular = False
             if count > 1:
                 return
-        steps = self._undisturbed_steps(coordinates.stepped) if regular else UndisturbedSteps(coordinates.stepped, step)
+        steps = (
+            self._undisturbed_steps(coordinates.discretised)
+            if regular
+            else UndisturbedSteps(coordinates.discretised, step)
+        )
         expected = steps.after(self._state[None], np.array([count]))[0, 0]
         self._check_undisturbed(
             coordinates.views[0], expected, float(amplitudes(self._state[None], steps.periods)[0]), t
@@ -518,7 +353,7 @@ class RunAhead:
         """Raise if anything but Exudyn's steps has changed the coordinates since the last event step."""
         coordinates, scale = self._body.coordinates, self._displacement_scale
         if coordinates.has_friction:  # a stick position displaces the structure without any modal motion
-            scale += float(np.linalg.norm(coordinates.stepped.loaded.channels.shapes @ coordinates.held))
+            scale += float(np.linalg.norm(coordinates.discretised.loaded.channels.shapes @ coordinates.held))
         difference, limit = q - expected, CHANGED * max(largest, UNSEEN * scale)
         square = difference.dot(difference)  # modes of zero frequency have no amplitude: compared with their distance
         if not (square <= limit * limit or square <= CHANGED**2 * expected.dot(expected)):
@@ -527,9 +362,11 @@ class RunAhead:
                 "the PreStep or PostStep function that sets them to be there before the run begins"
             )
 
-    def _undisturbed_steps(self, stepped: SteppedLevel) -> UndisturbedSteps:
+    def _undisturbed_steps(self, discretised: DiscretisedLevel) -> UndisturbedSteps:
         step, levels = self._step_size, self._body.own_loads.static_levels
-        return levels.further(stepped.states, ("steps", stepped.step, step), lambda: UndisturbedSteps(stepped, step))
+        return levels.further(
+            discretised.states, ("steps", discretised.step, step), lambda: UndisturbedSteps(discretised, step)
+        )
 
     # ------------------------------------------------------------------ the plan
 
@@ -546,7 +383,7 @@ class RunAhead:
             self._changes_passed = len(self._interval.change_times)
             self._truncated = self.update_record()
             self._past_events.append(self._interval.events)
-            self._interval, self._changes_passed = self._motion.advance(self._plan_end(t)), 0
+            self._interval, self._changes_passed = self._advance(self._plan_end(t)), 0
         self._steps, self._next = self._plan(missed), 0
 
     @property
@@ -560,15 +397,102 @@ class RunAhead:
         """Time [s] up to which the motion is to be computed."""
         return max(t, min(t + self._step_size * (self._plan_length - 1), self._end))
 
+    def _advance(self, until: float) -> MotionInterval:
+        """The next interval of the motion, up to ``until`` [s]."""
+        motion = self._motion
+        motion.continue_from(*self._continuation)
+        motion.advance(until)
+        self._continuation = motion.state, motion.time
+        times, _, _, truncated = motion.events.table().T
+        return MotionInterval(
+            end=motion.time,
+            events=motion.events,
+            event_times=times,
+            truncated=truncated,
+            final_state=motion.state,
+            failure=motion.message,
+            segments=motion.record,  # a body reports neither defects nor works
+            phases=motion.record.start_phases(),
+            static_levels=motion.levels.alone,
+        )
+
     def _plan(self, missed: bool) -> EventSteps:
-        level = self._body.coordinates.stepped
-        start = PlanStart(self.time, self.index, self._step_size, level, self._state, self._changes_passed)
-        return plan_event_steps(self._body, self._interval, start, self._undisturbed_steps, self._plan_length, missed)
+        """Plan the event steps within the interval, among the next ends of steps, the present one included.
+
+        missed: whether a change has been missed, which makes the present end of a step one of them.
+        """
+        interval, h, start, varies = self._interval, self._step_size, self.time, self._body.varies
+        last = min(self._plan_length - 1, math.floor((interval.end - start) / h + TIME_ROUNDING))
+        change_times = interval.change_times[self._changes_passed :]
+        change_steps = np.ceil((change_times - start) / h - TIME_ROUNDING)
+        change_steps = np.maximum(change_steps + (start + h * change_steps < change_times), 0).astype(int)
+        change_times, change_steps = change_times[change_steps <= last], change_steps[change_steps <= last]
+        candidates = np.arange(last + 1) if varies else change_steps if not missed else np.append(0, change_steps)
+        first = np.flatnonzero(candidates > np.append(-1, candidates)[:-1])
+        steps = candidates[first]
+        times = start + h * steps
+        if interval.failure:
+            before_failure = times < interval.end
+            steps, first, times = steps[before_failure], first[before_failure], times[before_failure]
+        due_times = times - TIME_ROUNDING * h
+        if not (varies or missed):
+            due_times = np.minimum(due_times, change_times[first])
+        levels, numbers, states, data = self._planned_states(times)
+        if last > (steps[-1] if len(steps) else 0) and not interval.failure:
+            steps, end = np.append(steps, last), start + h * last
+            times, due_times = np.append(times, end), np.append(due_times, end - TIME_ROUNDING * h)
+        expected, largest = self._expected(steps, levels, numbers, states)
+        passed = self._changes_passed + np.searchsorted(change_steps, steps, side="right")
+        return EventSteps(
+            times=times.tolist(),
+            due_times=due_times.tolist(),
+            indices=(self.index + steps).tolist(),
+            changes_passed=passed.tolist(),
+            levels=[levels[number] for number in numbers.tolist()],
+            states=states,
+            data=data,
+            expected=expected,
+            largest=np.maximum.accumulate(largest).tolist(),
+        )
+
+    def _planned_states(self, times: np.ndarray) -> tuple[list[DiscretisedLevel], np.ndarray, np.ndarray, np.ndarray]:
+        """Levels, the present one first; at times (n,) [s] number of the level, states (n, 3, s), data (n, width).
+
+        The phases in the data are those with which the level was entered.
+        """
+        body, first = self._body, self._body.coordinates.discretised
+        layout, count, levels = body.coordinates.layout, len(times), [first]
+        numbers, states, data = np.zeros(count, int), np.empty((count, 3, first.size)), np.zeros((count, layout.width))
+        for part in self._interval.at(times) if count else ():
+            rows, key = part.indices, part.level.states
+            discretised, forces = body.discretised_level(key), body.own_loads.forces(key, times[rows])
+            reached = discretised.solver_states(part.displacement, part.velocity, forces)
+            states[rows] = reached.reshape(len(rows), 3, -1)
+            data[rows] = layout.rows(key, part.phases, part.displacement[:, discretised.modes :])
+            if key != first.states:
+                numbers[rows] = len(levels)
+                levels.append(discretised)
+        return levels, numbers, states, data
+
+    def _expected(
+        self, steps: np.ndarray, levels: list[DiscretisedLevel], numbers: np.ndarray, states: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """q (n, s) before each step, by undisturbed ones from the event step before, and the largest amplitude (n,)."""
+        count, counts = len(steps), np.diff(steps, prepend=0)
+        before, numbers_before = np.concatenate([self._state[None], states])[:count], np.append(0, numbers)[:count]
+        q, periods = np.empty((2, count, levels[0].size))
+        for number, discretised in enumerate(levels):
+            rows = np.flatnonzero(numbers_before == number)
+            if len(rows):
+                undisturbed = self._undisturbed_steps(discretised)
+                q[rows] = undisturbed.after(before[rows], counts[rows])[:, 0]
+                periods[rows] = undisturbed.periods
+        return q, np.maximum(amplitudes(before, periods), _largest(q))
 
 
-def _displacement_scale(stepped: SteppedLevel) -> float:
+def _displacement_scale(discretised: DiscretisedLevel) -> float:
     """Modal displacement [m kg^1/2] of the asymptotic configuration and of the largest gap, as a scale."""
-    base = stepped.loaded.level.base
+    base = discretised.loaded.level.base
     sizes = np.linalg.norm(base.directions, axis=0)
     distances = np.divide(np.abs(base.gaps), sizes, out=np.zeros(len(sizes)), where=sizes > 0)
-    return float(np.linalg.norm(stepped.loaded.asymptotic.configuration) + np.max(distances, initial=0.0))
+    return float(np.linalg.norm(discretised.loaded.asymptotic.configuration) + np.max(distances, initial=0.0))

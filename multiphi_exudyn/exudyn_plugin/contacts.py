@@ -34,6 +34,18 @@ from multiphi_exudyn.exudyn_plugin.system import sphere_gap
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.friction import Friction
 
+__all__ = [
+    "Sphere",
+    "contact_distance",
+    "contacts_of",
+    "coordinate_row",
+    "default_points",
+    "frictions_of",
+    "moved_by",
+    "requested_points",
+    "spheres_of",
+]
+
 HELD = 1e-9  # of a row's largest entry before projection: a smaller row is a point that constraints fix
 _AXES = ("x", "y", "z")
 _VELOCITIES = {"initialVelocities", "initialCoordinates_t"}  # parameters of nodes with ODE2 coordinates only

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import exudyn as exu
@@ -27,6 +27,8 @@ from multiphi_exudyn.mechanics.loads import ConstantLoad, Gravity, Load
 from multiphi_exudyn.time.motion import Motion
 from multiphi_exudyn.time.simulate import Run, base_warnings_of, check_start, holding
 from multiphi_exudyn.time.trajectory import Trajectory
+
+__all__ = ["CreateMultiPhiBody", "bind"]
 
 PROVISIONAL = 1.0  # s: end of the run for which the loads are prepared, until the solver gives the real one
 
@@ -202,14 +204,14 @@ def _motion(run: Run) -> Motion:
 
 
 def _add_items(mbs: Any, body: MultiPhiBody, visualization: dict[str, Any], drawing: Drawing | None) -> dict[str, Any]:
-    stepped, (q, q_t) = body.stepped_level(body.state.states), body.start
+    discretised, (q, q_t) = body.discretised_level(body.state.states), body.start
     node = mbs.AddNode(
         NodeGenericODE2(
             name=f"Node:{body.name}",
-            referenceCoordinates=np.zeros(stepped.size),
+            referenceCoordinates=np.zeros(discretised.size),
             initialCoordinates=q,
             initialCoordinates_t=q_t,
-            numberOfODE2Coordinates=stepped.size,
+            numberOfODE2Coordinates=discretised.size,
         )
     )
     items = {"nGenericODE2": node}
@@ -217,7 +219,7 @@ def _add_items(mbs: Any, body: MultiPhiBody, visualization: dict[str, Any], draw
         ObjectGenericODE2(
             name=body.name,
             nodeNumbers=[node],
-            **matrices(stepped, body.force_vector(stepped)),
+            **matrices(discretised, body.force_vector(discretised)),
             visualization=VObjectGenericODE2(
                 **visualization,
                 graphicsDataUserFunction=0 if drawing is None else graphics_of(body, drawing, visualization["color"]),
@@ -236,6 +238,23 @@ def _add_items(mbs: Any, body: MultiPhiBody, visualization: dict[str, Any], draw
 
 def _add_interface(mbs: Any, body: MultiPhiBody, nodes: Sequence[InterfaceNode], visualization: dict[str, Any]) -> None:
     interface = body.coordinates.interface = Interface(mbs, body.name, nodes, body.model.most_levels)
-    stepped = body.stepped_level(body.state.states)
-    interface.add(body.items["nGenericODE2"], stepped, body.state.held, *body.start, visualization)
+    discretised = body.discretised_level(body.state.states)
+    interface.add(body.items["nGenericODE2"], discretised, body.state.held, *body.start, visualization)
     body.items["nInterface"], body.items["sInterface"] = interface.nodes, interface.sensors
+
+
+def bind(function: Callable[..., Any]) -> None:
+    """Make ``function(mbs, ...)`` a method of ``mbs``, unless Exudyn has a method of this name itself.
+
+    Exudyn's registry is used if it exists, else a plain class attribute.
+    """
+    name = function.__name__
+    if hasattr(exu.MainSystem, name):
+        return
+    try:
+        from exudyn.misc.extensionRegistry import extends, install
+    except ImportError:
+        setattr(exu.MainSystem, name, function)
+        return
+    extends(exu.MainSystem, name)(function)
+    install()

@@ -1,4 +1,4 @@
-"""Stepped level: the equations of a level for a time integration, plain or with modes matched to the step.
+"""Discretised level: the equations of a level for a time integration, plain or with modes matched to the step.
 
     M q'' + D q' + K q = p + drive,   q = eta, padded to the body's size with coordinates that stay zero
 
@@ -28,9 +28,11 @@ import scipy.linalg
 from multiphi_exudyn.errors import MultiPhiValueError, NumericalFailure
 from multiphi_exudyn.time.loaded_level import LoadedLevel
 
+__all__ = ["DiscretisedLevel"]
+
 
 @dataclass(frozen=True)
-class SteppedLevel:
+class DiscretisedLevel:
     """Equations of motion of a level for a solver; all matrices (s, s), s >= r the size of the body.
 
     Coordinates beyond the level's r modes are never excited; they have the frequency of its highest mode.
@@ -52,7 +54,7 @@ class SteppedLevel:
     from_force: np.ndarray
 
     @classmethod
-    def of(cls, loaded: LoadedLevel, size: int, step: float | None) -> SteppedLevel:
+    def of(cls, loaded: LoadedLevel, size: int, step: float | None) -> DiscretisedLevel:
         """The equations of a level with modes matched to ``step`` [s], or plain for None.
 
         Raises NumericalFailure where a stick position drives a mode of zero frequency: a solver's force would change
@@ -73,8 +75,8 @@ class SteppedLevel:
         drive = np.zeros(size)
         drive[: level.modes] = loaded.asymptotic.drive
         maps = _plain(damping) if step is None else _matched(squares, stiffness, damping, step)
-        mass, stepped, q, v, g = maps
-        return cls(loaded, step, mass, stepped, stiffness, damping, squares, drive, q, v, g)
+        mass, discretised, q, v, g = maps
+        return cls(loaded, step, mass, discretised, stiffness, damping, squares, drive, q, v, g)
 
     @property
     def states(self) -> tuple[int, ...]:
@@ -102,14 +104,14 @@ class SteppedLevel:
     def velocity(self, q: np.ndarray, q_t: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Modal velocity eta' (s,) of a solver's state q, q' (s,) under a modal force (s,)."""
         difference = q_t - self.from_displacement.dot(q) - self.from_force.dot(force + self.drive)
-        return self._velocity_inverse.dot(difference)
+        return self.velocity_inverse.dot(difference)
 
     def solver_state(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, ...]:
         """q, q', q'' (s,) of eta, eta' (r,) under a modal force (s,); stick positions after eta are ignored."""
         r, s = self.modes, self.size
         modal = np.zeros(3 * s)
         modal[:r], modal[s : s + r], modal[2 * s :] = eta[:r], eta_t[:r], force + self.drive
-        rates = self._rates.dot(modal)
+        rates = self.rates.dot(modal)
         return modal[:s], rates[:s], rates[s:]
 
     def solver_states(self, eta: np.ndarray, eta_t: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -123,23 +125,22 @@ class SteppedLevel:
         q_tt[:] = (force + self.drive - q_t @ self.damping.T - q @ self.stiffness.T) @ self._mass_inverse.T
         return states
 
-    @functools.cached_property
-    def external_force_matrix(self) -> np.ndarray:
-        """Matrix (s, 3 s + 1) from (q, q', q'', 1) to the external modal force p, by the equation of motion."""
-        return np.hstack([self._equation_matrix, -self.drive[:, None]])
+    def external_force(self, q: np.ndarray, q_t: np.ndarray, q_tt: np.ndarray) -> np.ndarray:
+        """External modal force p (s,) of a state, by the equation of motion."""
+        return self.equation_matrix.dot(np.concatenate([q, q_t, q_tt])) - self.drive
 
     @functools.cached_property
     def to_physical(self) -> np.ndarray:
         """Matrix (3 s, 3 s) from (q, q', q'') to (eta, eta', eta''), for any force."""
         identity, none = np.eye(self.size), np.zeros((self.size, self.size))
-        difference = np.hstack([-self.from_displacement, identity, none]) - self.from_force @ self._equation_matrix
-        velocity = self._velocity_inverse @ difference
-        acceleration = self._equation_matrix - self.modal_damping @ velocity
+        difference = np.hstack([-self.from_displacement, identity, none]) - self.from_force @ self.equation_matrix
+        velocity = self.velocity_inverse @ difference
+        acceleration = self.equation_matrix - self.modal_damping @ velocity
         acceleration[:, : self.size] -= self.stiffness
         return np.vstack([np.hstack([identity, none, none]), velocity, acceleration])
 
     @functools.cached_property
-    def _rates(self) -> np.ndarray:
+    def rates(self) -> np.ndarray:
         """Matrix (2 s, 3 s) from eta, eta' and the total modal force to (q', q'')."""
         velocity = np.hstack([self.from_displacement, self.from_velocity, self.from_force])
         internal_force = self.damping @ velocity
@@ -148,15 +149,22 @@ class SteppedLevel:
         return np.vstack([velocity, -self._mass_inverse @ internal_force])
 
     @functools.cached_property
-    def _equation_matrix(self) -> np.ndarray:
+    def equation_matrix(self) -> np.ndarray:
+        """Matrix (s, 3 s) [K D M]."""
         return np.hstack([self.stiffness, self.damping, self.mass])
+
+    @functools.cached_property
+    def velocity_difference(self) -> np.ndarray:
+        """Matrix (s, 3 s) from q, q' and the total modal force to V eta'."""
+        return np.hstack([-self.from_displacement, np.eye(self.size), -self.from_force])
 
     @functools.cached_property
     def _mass_inverse(self) -> np.ndarray:
         return np.asarray(np.linalg.inv(self.mass))
 
     @functools.cached_property
-    def _velocity_inverse(self) -> np.ndarray:
+    def velocity_inverse(self) -> np.ndarray:
+        """V^-1 (s, s)."""
         return np.asarray(np.linalg.inv(self.from_velocity))
 
 

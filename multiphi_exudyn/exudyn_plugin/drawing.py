@@ -28,6 +28,8 @@ from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mechanics.arguments import is_real, real_array
 from multiphi_exudyn.mechanics.beam import Beam, beam_deflections
 
+__all__ = ["BLOCK", "Drawing", "check_drawing", "graphics_of"]
+
 PARALLEL = 1e-9  # relative: rounding of the coefficients of a contact's direction
 SIDES = 12  # of a bar: looks round, costs little
 BLOCK = 4.0  # edge of a stop's block in radii of the bars

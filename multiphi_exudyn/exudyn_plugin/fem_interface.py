@@ -22,6 +22,8 @@ from multiphi_exudyn.mechanics.dofs import COMPONENTS as NAMES
 from multiphi_exudyn.mechanics.dofs import DofTable
 from multiphi_exudyn.mechanics.structure import LinearStructure
 
+__all__ = ["linear_structure_from_fem"]
+
 COMPONENTS = 3  # of the displacement of a node
 IN_LINE = 1e-9  # of the largest moment of inertia: with a smaller one about an axis, all nodes lie on it
 

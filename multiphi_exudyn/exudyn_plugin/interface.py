@@ -1,37 +1,19 @@
-"""Interface nodes: nodes of an Exudyn system that represent points of a body.
+"""Interface: points of a body on which connectors, loads and sensors of an Exudyn system can act.
 
-    y = R q + c,   y the coordinates of the node: displacements [m] from its position, and angles [rad]
+    y = R q + c,   0 = f + reaction of the tie,   p = R^T f
+
+y (m,) displacements [m] and rotations [rad] of the points, the coordinates of massless nodes. R (m, s) rows of the
+points in the modes of the present level, c (m,) its asymptotic configuration there; f (m,) external forces on y [N, N
+m], p their modal force. The equation is a constraint, the tie, by one ObjectConnectorCoordinateVector per node. At a
+transition R and c are exchanged and y, y', y'' are written, so y is the displacement of the body at every step. With
+modes matched to the step, y' = R q' is the solver's velocity (discretised_level.py).
 
 One coordinate is a NodeGenericODE2. A position is a NodePoint2D or a NodePoint, whose coordinates are displacements in
 global directions; it takes markers of positions, and with them springs, distance and spherical joints. A rigid
 interface is a NodeRigidBody2D or a NodeRigidBodyRxyz; it takes markers of rigid bodies, and with them every joint. The
-nodes have no mass, and their coordinates are linear in q; the system around them may move by large displacements.
-
-The angles of a NodeRigidBodyRxyz are successive rotations about the node's x, y and z axis. Small ones are the
-components of one rotation, as in a linear structure; at 5 degrees about two axes the difference is 0.004 rad. At any
-angle, forces on the node have the same power as their modal forces p = R^T f.
-
-Modal force that is constant for the length of a step.
-
-A constant force p on the coordinates eta of a level only shifts the centre of their motion,
-
-    eta'' + D eta' + S (eta - d) = drive + p_0,   d = S^-1 p,   p_0 = (1 - S S^-1) p
-
-S is diag(omega^2) and the coupling by friction (sliding.py), S^-1 its inverse on the modes of nonzero frequency, p_0
-the force on the others. A force on coordinate k acts on mode k of the present level. If p comes from forces f on
-points, closed rigid contacts have the reactions L f in addition, which the modes of the level do not contain. Masses
-attached to the points take part in impacts (attached.py). The core has the levels under such forces
-(core/held_forces.hpp).
-
-Interface coordinates: points of a body on which connectors, loads and sensors of an Exudyn system can act.
-
-    y = R q + c,   0 = f + reaction of the tie,   p = R^T f
-
-y (m,) displacements and rotations of the points, the coordinates of massless nodes (above). R (m, s) rows
-of the points in the modes of the present level, c (m,) its asymptotic configuration there [m, rad]; f (m,) external
-forces on y [N, N m], p their modal force. The equation is a constraint, the tie, by one ObjectConnectorCoordinateVector
-per node. At a transition R and c are exchanged and y, y', y'' are written, so y is the displacement of the body at
-every step. With modes matched to the step, y' = R q' is the solver's velocity (discretised_level.py).
+system around the nodes may move by large displacements. The angles of a NodeRigidBodyRxyz are successive rotations
+about the node's x, y and z axis. Small ones are the components of one rotation, as in a linear structure; at 5 degrees
+about two axes the difference is 0.004 rad. At any angle, forces on the node have the same power as p.
 
 f comes from the multipliers of the ties, so points may depend on each other, and a closed rigid contact may fix one.
 Within the step of an event, the mean of f acts before the event; after it, the change of reactions, loads, connectors
@@ -39,10 +21,10 @@ and inertia at the event is added (coupled.py). This is exact for a constant for
 varies (halving the step once may give another ratio, as the time of the event within its step changes too). The modes
 are those of free points; a point with prescribed motion needs more of them.
 
-In an impact on a rigid contact, all masses and constraints tied to the points take part (attached.py). Springs
-and dampers do not, as their forces are finite. The step must be short enough to resolve their forces after an event;
-otherwise the run ends with an error (coupled.py). At a point that a closed rigid contact fixes, a further constraint
-is not allowed: Exudyn would have two constraints for one coordinate.
+In an impact on a rigid contact, all masses and constraints tied to the points take part. Springs and dampers do not, as
+their forces are finite. The step must be short enough to resolve their forces after an event; otherwise the run ends
+with an error. At a point that a closed rigid contact fixes, a further constraint is not allowed: Exudyn would have two
+constraints for one coordinate.
 """
 
 from __future__ import annotations
@@ -67,13 +49,23 @@ from exudyn.itemInterface import (
 
 from multiphi_exudyn.display import per_cent
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.exudyn_plugin.discretised_level import SteppedLevel
+from multiphi_exudyn.exudyn_plugin.discretised_level import DiscretisedLevel
 from multiphi_exudyn.levels.base.modal_base import ModalBase
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
 from multiphi_exudyn.mathematics.round_off import drop_round_off
 from multiphi_exudyn.mechanics.arguments import real_array
 from multiphi_exudyn.mechanics.structure import At, LinearStructure
+
+__all__ = [
+    "Interface",
+    "InterfaceNode",
+    "InterfacePoint",
+    "PositionInterface",
+    "RigidInterface",
+    "direct_reactions",
+    "interface_nodes",
+]
 
 TURN = math.radians(5.0)  # rad: limit of the rotation of an interface, as the body is linear
 ROTATIONS = {2: 1, 3: 3}  # by the number of directions: about z in a plane, about x, y and z in space
@@ -319,14 +311,14 @@ class Interface:
     def add(
         self,
         node: Any,
-        stepped: SteppedLevel,
+        discretised: DiscretisedLevel,
         held: np.ndarray,
         q: np.ndarray,
         q_t: np.ndarray,
         visualization: Mapping[str, Any],
     ) -> None:
         """Add nodes and ties for a body whose node has q, q' (s,) in a level with stick positions (h,) [m]."""
-        point_map, mbs = self.map_in(stepped), self._mbs
+        point_map, mbs = self.map_in(discretised), self._mbs
         marker, offsets = mbs.AddMarker(MarkerNodeCoordinates(nodeNumber=node)), point_map.offset(held)
         for interface_node, part in zip(self._interface_nodes, self._slices, strict=True):
             rows, offset, label = point_map.rows[part], offsets[part], f"{self._name}.{interface_node.name}"
@@ -350,17 +342,17 @@ class Interface:
                 )
             )
 
-    def map_in(self, stepped: SteppedLevel) -> _PointMap:
+    def map_in(self, discretised: DiscretisedLevel) -> _PointMap:
         """The map y = R q + c of a level."""
-        return self._maps.get_or_build(stepped.states, lambda: self._build_map(stepped))
+        return self._maps.get_or_build(discretised.states, lambda: self._build_map(discretised))
 
-    def _build_map(self, stepped: SteppedLevel) -> _PointMap:
-        loaded = stepped.loaded
+    def _build_map(self, discretised: DiscretisedLevel) -> _PointMap:
+        loaded = discretised.loaded
         level = loaded.modal
-        rows = np.zeros((len(self._rows), stepped.size))
+        rows = np.zeros((len(self._rows), discretised.size))
         in_base = self.in_base(level.base)
         rows[:, : level.modes] = drop_round_off(in_base @ level.vectors, np.abs(in_base) @ np.abs(level.vectors))
-        reactions = _direct_reactions(level, in_base, rows[:, : level.modes])
+        reactions = direct_reactions(level, in_base, rows[:, : level.modes])
         return _PointMap(rows, in_base @ loaded.asymptotic.configuration, in_base @ loaded.channels.shapes, reactions)
 
     def in_base(self, base: ModalBase) -> np.ndarray:
@@ -408,15 +400,15 @@ class Interface:
         for names, (line, start, end) in self._vectors.items():
             largest[names] = max(largest[names], _angle(line, line + end - start))
 
-    def record_static_error(self, stepped: SteppedLevel) -> None:
+    def record_static_error(self, discretised: DiscretisedLevel) -> None:
         """Keep what the modes leave out of the static response to the forces on the points, f of SolveStatic.
 
             d = R_0 (y(f) - Psi S^-1 R^T f),   error = max |d_i / l_i| / max |y_i / l_i|,   l_i^2 = R_0i Omega^-2 R_0i^T
 
         R_0 (m, b) are rows of the points in base coordinates, y(f) (b,) the response of the level without truncation.
         """
-        level, force = stepped.loaded.modal, -self.forces  # SolveStatic has the other sign of multipliers
-        in_base, modal = self.in_base(level.base), self.map_in(stepped).rows[:, : level.modes]
+        level, force = discretised.loaded.modal, -self.forces  # SolveStatic has the other sign of multipliers
+        in_base, modal = self.in_base(level.base), self.map_in(discretised).rows[:, : level.modes]
         _, whole = level.static_response(force @ in_base, np.zeros(len(level.indices)))
         left_out = np.abs(in_base @ (whole - level.vectors @ static_shift(level, force @ modal)))
         lengths = np.linalg.norm(in_base * level.base.periods, axis=1)
@@ -456,27 +448,20 @@ class Interface:
                 f"interface, so how far it turns is not known; {limit}, and add a second PositionInterface to watch it"
             )
 
-    def set_level(self, stepped: SteppedLevel, held: np.ndarray) -> None:
+    def set_level(self, discretised: DiscretisedLevel, held: np.ndarray) -> None:
         """Set R and c of a level in the ties, at stick positions (h,) [m]."""
-        point_map = self.map_in(stepped)
+        point_map = self.map_in(discretised)
         offsets = point_map.offset(held)
         for tie, part in zip(self.ties, self._slices, strict=True):
             self._mbs.SetObjectParameter(tie, "scalingMarker0", point_map.rows[part])
             self._mbs.SetObjectParameter(tie, "offset", offsets[part])
 
-    def write(self, stepped: SteppedLevel, held: np.ndarray, coordinates: Iterable[np.ndarray]) -> None:
+    def write(self, discretised: DiscretisedLevel, held: np.ndarray, coordinates: Iterable[np.ndarray]) -> None:
         """Write y, y', y'' for coordinates q, q', q'' (s,) and stick positions (h,) [m]."""
-        point_map = self.map_in(stepped)
+        point_map = self.map_in(discretised)
         for view, values in zip(self._views, coordinates, strict=True):
             view[self.indices] = point_map.rows.dot(values)
         self._views[0][self.indices] += point_map.offset(held)
-
-    def transform_force(self, force: np.ndarray, source: SteppedLevel, target: SteppedLevel) -> np.ndarray:
-        """Force (p, f) (s + m,) of one level in another: f stays the same, and the rest of p acts mode by mode."""
-        if source.states == target.states:
-            return force
-        modal, points = force[: source.size], force[source.size :]
-        return np.concatenate([modal + points @ (self.map_in(target).rows - self.map_in(source).rows), points])
 
 
 def _angle(first: np.ndarray, second: np.ndarray) -> float:
@@ -485,7 +470,7 @@ def _angle(first: np.ndarray, second: np.ndarray) -> float:
     return math.atan2(math.sqrt(max(0.0, first.dot(first) * second.dot(second) - along * along)), along)
 
 
-def _direct_reactions(level: Level, in_base: np.ndarray, rows: np.ndarray) -> np.ndarray:
+def direct_reactions(level: Level, in_base: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Reactions L (k, m) of closed rigid contacts to unit forces on points, without those to their modal forces.
 
     in_base, rows: rows of the points in base coordinates (m, b) and in the level's modes (m, r).

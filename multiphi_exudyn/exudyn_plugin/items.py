@@ -14,6 +14,30 @@ from typing import Any
 
 import numpy as np
 
+__all__ = [
+    "Item",
+    "contact_parameters",
+    "grouped",
+    "has_contact",
+    "has_friction",
+    "has_limit_stops",
+    "has_own_coordinates",
+    "is_active",
+    "is_constraint",
+    "is_contact",
+    "is_nonlinear_constraint",
+    "is_sphere_contact",
+    "left_out_directions",
+    "left_out_functions",
+    "left_out_objects",
+    "linearised_functions",
+    "load_item",
+    "missing_parts",
+    "taken_objects",
+    "user_function",
+    "value_key",
+]
+
 DAMPER_EXT = "ConnectorCoordinateSpringDamperExt"
 _FRICTION = ("dynamicFrictionForce", "staticFrictionOffsetForce", "viscousFrictionFactor")
 _SPHERES = "ContactSphereSphere"  # Exudyn's type of a sphere on a sphere, on triangles and on a torus
@@ -64,36 +88,6 @@ class Item:
         Exudyn's type of the item.
     became : str
         Its part in the model; empty if it was left out.
-
-    Examples
-    --------
-    >>> import exudyn as exu
-    >>> import exudyn.itemInterface as eii
-    >>> import multiphi_exudyn as mp
-    >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
-    >>> container = exu.SystemContainer()
-    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
-    >>> ground = mbs.AddNode(eii.NodePointGround())
-    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
-    >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
-    >>> ends = [
-    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
-    ...     for n in (ground, node)
-    ... ]
-    >>> spring = mbs.AddObject(
-    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
-    ... )
-    >>> data = mbs.AddNode(
-    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
-    ... )
-    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
-    >>> stop = mbs.AddObject(
-    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
-    ... )
-    >>> mbs.Assemble()
-    >>> taken = reduce(mbs).taken
-    >>> taken[1].name, taken[1].became
-    ('spring', 'its matrices')
     """
 
     name: str

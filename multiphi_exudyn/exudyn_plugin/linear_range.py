@@ -25,7 +25,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,17 +39,18 @@ from multiphi_exudyn.exudyn_plugin.items import value_key
 from multiphi_exudyn.exudyn_plugin.matrices import (
     DIFFERENTIATED,
     UnmovedDirections,
-    _largest_coordinate,
-    _matrices_of_moved_directions,
-    _product,
-    _row,
-    _springs_with_factors,
-    _without_stiffness,
     forces,
     geometric_stiffness,
+    largest_coordinate,
+    matrices_of_moved_directions,
+    rounded_product,
+    spring_row,
+    springs_with_factors,
+    without_stiffness,
 )
 from multiphi_exudyn.exudyn_plugin.system import (
     Directions,
+    changed,
     constraint_jacobian,
     generalised_forces,
     initial_is_current,
@@ -65,6 +66,8 @@ from multiphi_exudyn.exudyn_plugin.timed import PrescribedMotion, TimedLoad
 from multiphi_exudyn.mechanics.element import Element
 from multiphi_exudyn.mechanics.friction import Friction
 from multiphi_exudyn.time.trajectory import Trajectory
+
+__all__ = ["LinearLimits", "LinearRange", "MovedBy", "RangeCheck", "linearised"]
 
 FAST = 10.0  # times the rate of the motion: a faster mode follows it in equilibrium, with an error of 1 %
 TOUCHING = 1e-9  # of the largest displacement: a smaller gap counts as closed
@@ -286,6 +289,11 @@ class ConstrainedState:
     accelerations: np.ndarray
 
 
+def _without_contacts(mbs: Any) -> AbstractContextManager[None]:
+    objects, loads = items_of(mbs)
+    return without_contacts(mbs, dict(enumerate(objects)), loads)
+
+
 class FullSystem:
     """A system inside the context of ``opened``, without contacts, whose state may be changed."""
 
@@ -301,7 +309,7 @@ class FullSystem:
     @contextmanager
     def opened(cls, mbs: Any, displacement: np.ndarray, velocity: np.ndarray, time: float) -> Iterator[FullSystem]:
         """The system with q_0, v_0, (n_full,), at a time [s]; it is restored in any case."""
-        with initial_is_current(mbs), without_contacts(mbs, *items_of(mbs)), static_solver(mbs) as solver:
+        with initial_is_current(mbs), _without_contacts(mbs), static_solver(mbs) as solver:
             mbs.systemData.SetTime(time)
             yield cls(mbs, solver, displacement, velocity)
 
@@ -376,22 +384,24 @@ def _by_motions(mbs: Any, motions: Mapping[int, PrescribedMotion]) -> dict[int, 
     """M e^T, K e^T and C e^T (n_full, k) of prescribed motions, by index; round-off is set to zero."""
     if not motions:
         return {}
-    springs, geometric = _springs_with_factors(mbs), geometric_stiffness(mbs)
-    with _without_stiffness(mbs, springs):
+    springs, geometric = springs_with_factors(mbs), geometric_stiffness(mbs)
+    with changed(mbs, without_stiffness(springs)):
         mass, stiffness, damping = map(np.array, mbs.ComputeLinearizedSystem()[:3])
     stiffness += geometric
     for item in springs.values():
-        row = _row(mbs, item)
+        row = spring_row(mbs, item)
         stiffness += item["stiffness"] * np.outer(row, row)
         damping += item["damping"] * np.outer(row, row)
-    return {i: tuple(_product(a, m.directions.T) for a in (mass, stiffness, damping)) for i, m in motions.items()}
+    return {
+        i: tuple(rounded_product(a, m.directions.T) for a in (mass, stiffness, damping)) for i, m in motions.items()
+    }
 
 
 def _moved_by(
     motion: PrescribedMotion, basis: np.ndarray, momenta: np.ndarray, stiffness: np.ndarray, damping: np.ndarray
 ) -> MovedBy:
     """Its forces S^T K e^T and S^T C e^T; damping that is an error of differentiation beside the stiffness is zero."""
-    stiffness, damping = _product(basis.T, stiffness), _product(basis.T, damping)
+    stiffness, damping = rounded_product(basis.T, stiffness), rounded_product(basis.T, damping)
     negligible = DIFFERENTIATED * motion.scale * np.max(np.abs(stiffness), axis=0)
     return MovedBy(motion, momenta, stiffness, np.where(np.abs(damping) <= negligible, 0.0, damping))
 
@@ -409,14 +419,14 @@ def linearised(
     pulls = [column for _, *pair in by_motions.values() for pull in pair for column in pull.T]
     moved_velocity = sum((m.derivative(0.0, 1) @ m.directions for m in motions.values()), np.zeros(len(velocity)))
     present = forces(mbs, time)
-    checked, basis, unmoved = _matrices_of_moved_directions(
+    checked, basis, unmoved = matrices_of_moved_directions(
         mbs, velocity - moved_velocity, np.vstack([present, *rows, *pulls])
     )
     mass, stiffness, damping = checked.mass, checked.stiffness, checked.damping
     moved = {i: _moved_by(motions[i], basis, *matrices) for i, matrices in by_motions.items()}
     static = basis.T @ present + damping @ (basis.T @ (velocity - moved_velocity))
     static += sum((each.damping @ each.motion.derivative(0.0, 1) for each in moved.values()), np.zeros(len(static)))
-    largest = _largest_coordinate(mbs)
+    largest = largest_coordinate(mbs)
     return Linearisation(
         mass,
         damping,
@@ -452,38 +462,6 @@ class RangeCheck:
     softest : float
         Lowest stiffness per mass [1/s2] in the mean of the motion, in directions that the model leaves out because
         nothing moves the system there, if it is negative; else 0.
-
-    Examples
-    --------
-    >>> import exudyn as exu
-    >>> import exudyn.itemInterface as eii
-    >>> import multiphi_exudyn as mp
-    >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
-    >>> container = exu.SystemContainer()
-    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
-    >>> ground = mbs.AddNode(eii.NodePointGround())
-    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
-    >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
-    >>> ends = [
-    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
-    ...     for n in (ground, node)
-    ... ]
-    >>> spring = mbs.AddObject(
-    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
-    ... )
-    >>> data = mbs.AddNode(
-    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
-    ... )
-    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
-    >>> stop = mbs.AddObject(
-    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
-    ... )
-    >>> mbs.Assemble()
-    >>> reduction = reduce(mbs)
-    >>> given = {"velocity": reduction.velocity, "loads": reduction.loads}
-    >>> tr = mp.simulate(reduction.model, 0.1, **given)
-    >>> reduction.check(tr).holds
-    True
     """
 
     times: np.ndarray

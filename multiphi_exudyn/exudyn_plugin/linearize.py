@@ -12,24 +12,25 @@ forces enter by their tangent at q_0, loads only by their geometric stiffness (m
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import exudyn as exu
 import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiTypeError, MultiPhiValueError
-from multiphi_exudyn.exudyn_plugin.contacts import coordinate_row, default_points, requested_points
-from multiphi_exudyn.exudyn_plugin.items import has_own_coordinates
+from multiphi_exudyn.exudyn_plugin.contacts import contact_distance, contacts_of, default_points, requested_points
+from multiphi_exudyn.exudyn_plugin.items import has_own_coordinates, is_active, is_contact
 from multiphi_exudyn.exudyn_plugin.matrices import forces, projected_matrices
 from multiphi_exudyn.exudyn_plugin.start_state import violated_constraints
-from multiphi_exudyn.exudyn_plugin.system import initial_is_current
+from multiphi_exudyn.exudyn_plugin.system import initial_is_current, without_contacts
 from multiphi_exudyn.mechanics.arguments import Matrix
 from multiphi_exudyn.mechanics.contact import UnilateralContact
 from multiphi_exudyn.mechanics.damping import ModalDamping, RayleighDamping
 from multiphi_exudyn.mechanics.dofs import Place
 from multiphi_exudyn.mechanics.structure import LinearStructure
+
+__all__ = ["LinearizedStructure", "check_system", "linear_structure_from"]
 
 EQUILIBRIUM = 1e-6  # of the largest elastic force: residual of a static solution
 LARGEST = 10_000  # ODE2 coordinates: a dense matrix of them has 0.8 GB
@@ -59,36 +60,6 @@ class LinearizedStructure(LinearStructure):
         0 to n - 1: nothing is fixed but by the system's constraints.
     coordinates : array (n_full, n)
         S; a copy, read-only.
-
-    Examples
-    --------
-    >>> import exudyn as exu
-    >>> import exudyn.itemInterface as eii
-    >>> import multiphi_exudyn as mp
-    >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
-    >>> container = exu.SystemContainer()
-    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
-    >>> ground = mbs.AddNode(eii.NodePointGround())
-    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
-    >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
-    >>> ends = [
-    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
-    ...     for n in (ground, node)
-    ... ]
-    >>> spring = mbs.AddObject(
-    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
-    ... )
-    >>> data = mbs.AddNode(
-    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
-    ... )
-    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
-    >>> stop = mbs.AddObject(
-    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
-    ... )
-    >>> mbs.Assemble()
-    >>> structure = reduce(mbs).structure
-    >>> structure.n, structure.coordinates.shape
-    (1, (1, 1))
     """
 
     coordinates: np.ndarray
@@ -175,7 +146,7 @@ def linear_structure_from(
     ('stop', 0.001)
     """
     check_system(mbs)
-    objects = _contact_objects(mbs)
+    objects = _contacts(mbs)
     with initial_is_current(mbs):
         violated = violated_constraints(mbs)
         if violated:
@@ -183,12 +154,13 @@ def linear_structure_from(
                 f"mbs: its state violates constraints ({', '.join(violated)}), need a state that meets them: solve the "
                 "static problem first"
             )
-        gaps = [_gap(mbs, index) for index in objects]
-        with _without_contacts(mbs, objects):
+        gaps = {i: contact_distance(mbs, i, item) for i, item in objects.items()}
+        with without_contacts(mbs, objects):
             matrices, basis = projected_matrices(mbs)
             _check_equilibrium(mbs, matrices.stiffness, basis)
         rows = default_points(mbs, basis) if points is None else requested_points(mbs, points, basis)
-        contacts = tuple(_contact(mbs, index, gap, basis) for index, gap in zip(objects, gaps, strict=True))
+        full = [contact for i, item in objects.items() for contact in contacts_of(mbs, i, item, gaps[i])]
+        contacts = tuple(replace(contact, direction=np.asarray(contact.direction) @ basis) for contact in full)
     if damping is None and np.any(matrices.damping):
         damping = matrices.damping
     structure = LinearizedStructure(matrices.mass, matrices.stiffness, damping, rows, coordinates=basis)
@@ -234,21 +206,16 @@ def _has_first_order(mbs: Any, item: Mapping[str, Any]) -> bool:
     return any("ODE1" in mbs.GetNode(exu.NodeIndex(n))["nodeType"] for n in nodes if n >= 0)
 
 
-def _contact_objects(mbs: Any) -> list[Any]:
-    """Return the indices of active contacts; raise for one that is not a unilateral spring of one coordinate."""
-    indices = []
-    for i in range(mbs.systemData.NumberOfObjects()):
-        index = exu.ObjectIndex(i)
-        item = mbs.GetObject(index)
-        if not item["objectType"].startswith("Contact") or not item["activeConnector"]:
-            continue
+def _contacts(mbs: Any) -> dict[int, Mapping[str, Any]]:
+    """Active contacts by index; raise for one that is not a unilateral spring of one coordinate."""
+    contacts = {i: item for i, item in enumerate(_objects(mbs)) if is_contact(item) and is_active(item)}
+    for item in contacts.values():
         if item["objectType"] != "ContactCoordinate":
             raise MultiPhiValueError(
                 f"contact {item['name']!r}: got Object{item['objectType']}, need ObjectContactCoordinate"
             )
         _check_law(item)
-        indices.append(index)
-    return indices
+    return contacts
 
 
 def _check_law(item: Mapping[str, Any]) -> None:
@@ -260,18 +227,6 @@ def _check_law(item: Mapping[str, Any]) -> None:
             )
 
 
-@contextmanager
-def _without_contacts(mbs: Any, objects: list[Any]) -> Iterator[None]:
-    """Switch the contacts off; they are restored in any case."""
-    try:
-        for index in objects:
-            mbs.SetObjectParameter(index, "activeConnector", False)
-        yield
-    finally:
-        for index in objects:
-            mbs.SetObjectParameter(index, "activeConnector", True)
-
-
 def _check_equilibrium(mbs: Any, stiffness: np.ndarray, basis: np.ndarray) -> None:
     unbalanced = np.abs(basis @ (basis.T @ forces(mbs)))  # by constraint forces
     elastic = np.max(np.abs(stiffness) @ np.abs(basis.T @ mbs.systemData.GetODE2Coordinates()))
@@ -280,13 +235,3 @@ def _check_equilibrium(mbs: Any, stiffness: np.ndarray, basis: np.ndarray) -> No
             f"mbs: its state without contacts is out of balance by {np.max(unbalanced):g} N (or N m), need "
             "an equilibrium with open contacts: take loads off, or solve the static problem first"
         )
-
-
-def _contact(mbs: Any, index: Any, gap: float, basis: np.ndarray) -> UnilateralContact:
-    item = mbs.GetObject(index)
-    first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) @ basis for m in item["markerNumbers"])
-    return UnilateralContact(item["name"], second - first, gap, float(item["contactStiffness"]))
-
-
-def _gap(mbs: Any, index: Any) -> float:
-    return float(mbs.GetObjectOutput(index, exu.OutputVariableType.Distance))

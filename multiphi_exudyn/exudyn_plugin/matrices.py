@@ -23,8 +23,7 @@ part of K, where round-off of a stiff mode does not affect a soft one.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,17 +36,36 @@ from multiphi_exudyn.errors import MultiPhiValueError
 from multiphi_exudyn.exudyn_plugin.contacts import coordinate_row
 from multiphi_exudyn.exudyn_plugin.items import is_nonlinear_constraint
 from multiphi_exudyn.exudyn_plugin.system import (
+    Change,
     Directions,
-    _largest_coordinate_name,
-    _object_name,
+    changed,
     constraint_jacobian,
     coordinate_name,
     generalised_forces,
+    largest_coordinate_name,
     mass_matrix,
+    object_name,
     static_solver,
 )
 from multiphi_exudyn.mathematics.modes import Modes, complete_modes
 from multiphi_exudyn.mathematics.round_off import drop_round_off
+
+__all__ = [
+    "DIFFERENTIATED",
+    "UnmovedDirections",
+    "check_finite",
+    "check_mass",
+    "forces",
+    "geometric_stiffness",
+    "largest_coordinate",
+    "matrices_of_moved_directions",
+    "moved_directions",
+    "projected_matrices",
+    "rounded_product",
+    "spring_row",
+    "springs_with_factors",
+    "without_stiffness",
+]
 
 FORCE_ROUND_OFF = 1e-12  # of the largest force: a smaller constraint force is round-off
 STRAIGHT = ("MassPoint", "Mass1D", "ANCF", "Ground")  # bodies whose points move linearly with the coordinates
@@ -104,20 +122,9 @@ def _multipliers(mass: np.ndarray, jacobian: np.ndarray, forces: np.ndarray) -> 
 def _of_loads(mbs: Any, solver: Any, vectors: Mapping[int, Any]) -> np.ndarray:
     count = range(solver.GetODE2size())
     with_loads = NumericalJacobian(mbs, lambda: generalised_forces(mbs, solver), count)
-    with _without(mbs, vectors):
+    changes = [(exu.LoadIndex(i), "loadVector", 0 * np.array(vector), vector) for i, vector in vectors.items()]
+    with changed(mbs, changes):
         return np.asarray(NumericalJacobian(mbs, lambda: generalised_forces(mbs, solver), count) - with_loads)
-
-
-@contextmanager
-def _without(mbs: Any, vectors: Mapping[int, Any]) -> Iterator[None]:
-    """Set loads to zero; they are restored in any case."""
-    try:
-        for i, vector in vectors.items():
-            mbs.SetLoadParameter(exu.LoadIndex(i), "loadVector", 0 * np.array(vector))
-        yield
-    finally:
-        for i, vector in vectors.items():
-            mbs.SetLoadParameter(exu.LoadIndex(i), "loadVector", vector)
 
 
 class NotLinearStructure(MultiPhiValueError):
@@ -156,7 +163,7 @@ def checked_matrices(
         modes = complete_modes(mass, stiffness)
     except MultiPhiValueError as error:
         values, vectors = scipy.linalg.eigh(stiffness, mass, subset_by_index=[0, 0])
-        where = f"(omega^2 = {values[0]:.3g} 1/s2), mainly of {_largest_coordinate_name(mbs, basis @ vectors[:, 0])}"
+        where = f"(omega^2 = {values[0]:.3g} 1/s2), mainly of {largest_coordinate_name(mbs, basis @ vectors[:, 0])}"
         raise NotLinearStructure(
             f"stiffness: got a negative eigenvalue {where}, need a stable state, or a constraint there",
             f"one of them unstable {where}",
@@ -179,7 +186,7 @@ def check_mass(mbs: Any, mass: np.ndarray, basis: np.ndarray) -> None:
 def _check_positive(mbs: Any, mass: np.ndarray, basis: np.ndarray) -> None:
     values, vectors = scipy.linalg.eigh(mass)
     if values[0] <= MASSLESS * values[-1]:
-        where = _largest_coordinate_name(mbs, basis @ vectors[:, 0])
+        where = largest_coordinate_name(mbs, basis @ vectors[:, 0])
         share = values[0] / values[-1] if values[-1] > 0 else 0.0
         raise MultiPhiValueError(
             f"mass: got {_kind(values[0], values[-1])} mass at {where} ({share:.1g} of the largest), "
@@ -193,7 +200,7 @@ def check_finite(mbs: Any, name: str, matrix: np.ndarray, basis: np.ndarray) -> 
     """Raise MultiPhiValueError for a matrix (n, n) in the coordinates of S with an entry that is not finite."""
     bad = np.flatnonzero(~np.all(np.isfinite(matrix), axis=1))
     if len(bad):
-        where = _largest_coordinate_name(mbs, basis[:, bad[0]])
+        where = largest_coordinate_name(mbs, basis[:, bad[0]])
         raise MultiPhiValueError(
             f"{name}: got an entry that is not a finite number, first at {where}, need finite forces and a finite "
             "tangent in this state"
@@ -267,7 +274,7 @@ def _objects_with(mbs: Any, coordinates: set[int]) -> list[str]:
     """Names of the objects that have all of these ODE2 coordinates."""
     count = mbs.systemData.NumberOfObjects()
     indices = [i for i in range(count) if coordinates <= set(mbs.systemData.GetObjectLTGODE2(exu.ObjectIndex(i)))]
-    return [_object_name(mbs.GetObject(exu.ObjectIndex(i))) for i in indices]
+    return [object_name(mbs.GetObject(exu.ObjectIndex(i))) for i in indices]
 
 
 def moved_directions(
@@ -325,12 +332,12 @@ def _tangent_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
     Entries of K that are round-off of the geometric stiffness, or of a force over the system's size, are set to zero:
     they would be a frequency, or an instability. So are entries of C that are round-off beside the fastest rate.
     """
-    springs, geometric = _springs_with_factors(mbs), geometric_stiffness(mbs)
-    with _without_stiffness(mbs, springs):
+    springs, geometric = springs_with_factors(mbs), geometric_stiffness(mbs)
+    with changed(mbs, without_stiffness(springs)):
         result = mbs.ComputeLinearizedSystem(
             projectIntoConstraintNullspace=True, returnConstraintJacobian=True, returnConstraintNullspace=True
         )
-        sizes = np.abs(geometric) + np.max(np.abs(forces(mbs))) / (_largest_coordinate(mbs) or math.inf)
+        sizes = np.abs(geometric) + np.max(np.abs(forces(mbs))) / (largest_coordinate(mbs) or math.inf)
     mass, stiffness, damping = (np.array(matrix) for matrix in result[:3])
     basis = np.asarray(result[4]).T if len(result) > 3 else np.eye(len(mass))
     if basis.shape[1] == 0:
@@ -338,7 +345,7 @@ def _tangent_matrices(mbs: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.
     stiffness += basis.T @ geometric @ basis
     stiffness = drop_round_off(stiffness, np.abs(basis).T @ sizes @ np.abs(basis))
     for item in springs.values():
-        row = _row(mbs, item) @ basis
+        row = spring_row(mbs, item) @ basis
         stiffness += item["stiffness"] * np.outer(row, row)
         damping += item["damping"] * np.outer(row, row)
     return mass, stiffness, drop_round_off(damping, _fastest(mass, stiffness) * _masses(mass)), basis
@@ -356,16 +363,16 @@ def _fastest(mass: np.ndarray, stiffness: np.ndarray) -> float:
     return math.sqrt(float(np.max(springs[masses > 0.0] / masses[masses > 0.0], initial=0.0)))
 
 
-def _row(mbs: Any, spring: Mapping[str, Any]) -> np.ndarray:
+def spring_row(mbs: Any, spring: Mapping[str, Any]) -> np.ndarray:
     first, second = (coordinate_row(mbs, exu.MarkerIndex(m)) for m in spring["markerNumbers"])
     return np.asarray(spring["factor1"] * second - spring["factor0"] * first)
 
 
-def _product(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def rounded_product(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
     return drop_round_off(matrix @ columns, np.abs(matrix) @ np.abs(columns))
 
 
-def _matrices_of_moved_directions(
+def matrices_of_moved_directions(
     mbs: Any, velocity: np.ndarray, forces_on_system: np.ndarray
 ) -> tuple[CheckedMatrices, np.ndarray, UnmovedDirections | None]:
     """M, K, C in z, S, and the directions that are left out.
@@ -390,14 +397,14 @@ def _matrices_of_moved_directions(
     return checked_matrices(mbs, mass, stiffness, damping, basis, SYMMETRISED), basis, unmoved
 
 
-def _largest_coordinate(mbs: Any) -> float:
+def largest_coordinate(mbs: Any) -> float:
     """Largest coordinate of the initial state, the reference included [m, rad]."""
     kinds = exu.ConfigurationType
     coordinates = (mbs.systemData.GetODE2Coordinates(kind) for kind in (kinds.Reference, kinds.Initial))
     return float(np.max(np.abs(sum(coordinates))))
 
 
-def _springs_with_factors(mbs: Any) -> dict[int, dict[str, Any]]:
+def springs_with_factors(mbs: Any) -> dict[int, dict[str, Any]]:
     """Springs of coordinates with factors, which Exudyn's tangent does not contain."""
     items = {i: mbs.GetObject(exu.ObjectIndex(i)) for i in range(mbs.systemData.NumberOfObjects())}
     springs = {i: item for i, item in items.items() if (item.get("factor0", 1.0), item.get("factor1", 1.0)) != (1, 1)}
@@ -410,18 +417,10 @@ def _springs_with_factors(mbs: Any) -> dict[int, dict[str, Any]]:
     return springs
 
 
-@contextmanager
-def _without_stiffness(mbs: Any, springs: Mapping[int, Mapping[str, Any]]) -> Iterator[None]:
-    """Set stiffness and damping of springs to zero; they are restored in any case."""
-    try:
-        for i in springs:
-            for name in ("stiffness", "damping"):
-                mbs.SetObjectParameter(exu.ObjectIndex(i), name, 0.0)
-        yield
-    finally:
-        for i, item in springs.items():
-            for name in ("stiffness", "damping"):
-                mbs.SetObjectParameter(exu.ObjectIndex(i), name, item[name])
+def without_stiffness(springs: Mapping[int, Mapping[str, Any]]) -> list[Change]:
+    """Changes that set stiffness and damping of springs to zero."""
+    keys = ("stiffness", "damping")
+    return [(exu.ObjectIndex(i), key, 0.0, item[key]) for i, item in springs.items() for key in keys]
 
 
 def forces(mbs: Any, time: float = 0.0) -> np.ndarray:

@@ -68,6 +68,8 @@ from multiphi_exudyn.mechanics.loads import ConstantLoad, FunctionLoad, Load, St
 from multiphi_exudyn.mechanics.time_functions import Smooth
 from multiphi_exudyn.time.trajectory import Trajectory
 
+__all__ = ["Reduction", "reduce"]
+
 SMALL = 100  # coordinates up to which all modes are kept by default: a run then has the accuracy of the system's own
 HELD = 1e-9  # of a row's largest entry before projection: a smaller row is a contact whose gap constraints fix
 
@@ -95,41 +97,6 @@ class Reduction(Shown):
         Distance of q_0 from the system's current coordinates where these violate constraints, else zero.
     prescribed : callable
         s(t) (n_full,), the motion that constraints prescribe by functions of time; zero without any.
-
-    Examples
-    --------
-    >>> import exudyn as exu
-    >>> import exudyn.itemInterface as eii
-    >>> import multiphi_exudyn as mp
-    >>> from multiphi_exudyn.exudyn_plugin import linear_structure_from, reduce
-    >>> container = exu.SystemContainer()
-    >>> mbs = container.AddSystem()  # 1 kg on a spring of 4e4 N/m, a stop 1 mm below
-    >>> ground = mbs.AddNode(eii.NodePointGround())
-    >>> node = mbs.AddNode(eii.Node1D(initialVelocities=[-0.5]))
-    >>> mass = mbs.AddObject(eii.ObjectMass1D(name="mass", mass=1.0, nodeNumber=node))
-    >>> ends = [
-    ...     mbs.AddMarker(eii.MarkerNodeCoordinate(nodeNumber=n, coordinate=0))
-    ...     for n in (ground, node)
-    ... ]
-    >>> spring = mbs.AddObject(
-    ...     eii.CoordinateSpringDamper(name="spring", markerNumbers=ends, stiffness=4e4)
-    ... )
-    >>> data = mbs.AddNode(
-    ...     eii.NodeGenericData(initialCoordinates=[1.0], numberOfDataCoordinates=1)
-    ... )
-    >>> law = {"contactStiffness": 1e6, "offset": -1e-3, "nodeNumber": data}
-    >>> stop = mbs.AddObject(
-    ...     eii.ObjectContactCoordinate(name="stop", markerNumbers=ends, **law)
-    ... )
-    >>> mbs.Assemble()
-    >>> print(reduce(mbs).report)
-    1 degrees of freedom, contacts: 1, frictions: 0, modes: all
-    taken
-      ObjectMass1D 'mass': its matrices
-      ObjectConnectorCoordinateSpringDamper 'spring': its matrices
-      ObjectContactCoordinate 'stop': contact, 1e+06 N/m
-    left out
-      nothing
     """
 
     model: MultiPhiModel
@@ -322,7 +289,7 @@ def reduce(
         ]
         full_contacts += [friction for friction in frictions.values() if isinstance(friction, Friction)]
         full_rows = {c.name: np.asarray(c.direction) for c in full_contacts}
-        with without_contacts(mbs, objects, loads):
+        with without_contacts(mbs, dict(enumerate(objects)), loads):
             varying, forces = timed_loads(mbs, loads, now), timed_forces(mbs, objects, now)
             timed = {i: load for i, load in varying.items() if isinstance(load, TimedLoad)}
             time_loads = (*timed.values(), *forces.values())

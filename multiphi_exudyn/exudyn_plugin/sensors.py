@@ -1,14 +1,10 @@
-"""Reconstruction of the motion of points and of contact forces from the coordinates of a body (eq. 38.4).
+"""Sensors of a Multi-Phi body, and histories that are computed from them after a run (eq. 38.4).
 
-    x_p(t) = p.(Phi_l eta(t) + x_inf,l),   g_i(t) = h_i.x + gap_i,   lambda_i(t) from eta, eta' (level.py), and L f
-
-Friction forces T and the positions of friction patches follow in the same way (time/level_rows.py). L f are reactions
-of closed contacts to forces f on points (interface.py).
-
-Sensors of a Multi-Phi body, and histories that are computed from them after a run (reconstruction.py).
+    x_p(t) = p.(Phi_l eta(t) + x_inf,l),   g_i(t) = h_i.x + gap_i,   lambda_i(t) from eta, eta', and L f
 
 Exudyn's own node sensors record eta, its derivatives and the level with its stick positions, at hardly any cost during
-a run.
+a run. Friction forces T and the positions of friction patches follow in the same way. L f are reactions of closed
+contacts to forces f on points (interface.py).
 """
 
 from __future__ import annotations
@@ -31,6 +27,8 @@ from multiphi_exudyn.mechanics.element import links_of
 from multiphi_exudyn.time.loaded_level import LoadedLevel
 from multiphi_exudyn.time.segments import force_row, patch_row, pressing_row
 from multiphi_exudyn.time.state import Event
+
+__all__ = ["BodyHistories", "add_sensors", "body_histories", "reconstruct"]
 
 RECORDED = {
     "sCoordinates": exu.OutputVariableType.Coordinates,
@@ -58,16 +56,16 @@ def reconstruct(
     in_base = rows @ body.model.base.modes.shapes
     for states in np.unique(all_states, axis=0):
         samples = np.flatnonzero(np.all(all_states == states, axis=1))
-        stepped, held = body.stepped_level(states.tolist()), layout.held(data[samples]).T
-        r, physical = stepped.modes, stepped.to_physical @ stored[samples].T
-        eta, eta_t = physical[:r], physical[stepped.size : stepped.size + r]
-        loaded, xi, xi_t = body.own_loads.level_coordinates(stepped, eta, eta_t, held, time[samples])
+        discretised, held = body.discretised_level(states.tolist()), layout.held(data[samples]).T
+        r, physical = discretised.modes, discretised.to_physical @ stored[samples].T
+        eta, eta_t = physical[:r], physical[discretised.size : discretised.size + r]
+        loaded, xi, xi_t = body.own_loads.level_coordinates(discretised, eta, eta_t, held, time[samples])
         level, asymptotic = loaded.level, loaded.asymptotic
         displacements[:, samples] = in_base @ (level.vectors @ xi + asymptotic.configuration[:, None])
         velocities[:, samples] = in_base @ level.vectors @ xi_t
         gaps[:, samples] = (level.gap_rows @ xi + loaded.gap_constants[:, None])[: len(elements)]
         state = np.vstack([xi, xi_t, np.ones(len(samples))])
-        direct_reactions = body.coordinates.direct_reactions(stepped) @ on_points[:, samples]
+        direct_reactions = body.coordinates.direct_reactions(discretised) @ on_points[:, samples]
         for i in range(len(elements)):
             forces[i, samples] = pressing_row(i, loaded) @ state + _direct_share(
                 loaded, i, direct_reactions, held=False
@@ -120,35 +118,6 @@ class BodyHistories(Shown):
         In order of time, with times inside steps.
     warnings : tuple of str
         Warnings about the accuracy of the run.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import exudyn as exu
-    >>> import multiphi_exudyn as mp
-    >>> from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
-    >>> K = 4e4 * np.array([[2, -1, 0], [-1, 2, -1], [0, -1, 1]])  # N/m
-    >>> chain = mp.LinearStructure(np.eye(3), K, mp.ModalDamping(0.01), {"tip": 2})
-    >>> stop = mp.UnilateralContact("stop", "tip", gap=1e-3, stiffness=1e6)
-    >>> model = mp.MultiPhiModel(chain, [stop])
-    >>> container = exu.SystemContainer()
-    >>> mbs = container.AddSystem()
-    >>> pulled = model.static_equilibrium({"tip": 100.0})
-    >>> given = {"displacement": pulled, "matchedStepSize": 1e-3}
-    >>> items = CreateMultiPhiBody(mbs, model, name="chain", **given)
-    >>> mbs.Assemble()
-    >>> settings = exu.SimulationSettings()
-    >>> settings.solution.file.write = False
-    >>> settings.timeIntegration.endTime = 0.1
-    >>> settings.timeIntegration.numberOfSteps = 100
-    >>> solver = exu.DynamicSolverType.TrapezoidalIndex2
-    >>> done = mbs.SolveDynamic(settings, solverType=solver)
-    >>> histories = body_histories(mbs, items)
-    >>> histories.time.shape == histories.points["tip"].shape
-    True
-    >>> first = histories.events[0]
-    >>> first.contact, first.kind, round(first.time, 4)
-    ('stop', 'close', 0.0197)
     """
 
     time: np.ndarray

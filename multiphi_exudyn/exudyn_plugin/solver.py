@@ -1,35 +1,24 @@
-"""Static solutions with Multi-Phi bodies: each ends in the level whose contacts and reactions agree with it.
+"""The solver and the bodies: their common PostStep function, what they need of a solver, and static solutions.
 
-Exudyn solves with the matrices of one level. There every signal of an exit has to be at least zero: gaps of open
-contacts, forces of closed ones, the distance of a force law to the ends of its segment, and the reserve of friction
-that sticks. Where some are negative, the element of the most negative one, relative to its terms, takes the exit and
-Exudyn solves again. If this does not end, the first of them does, in a fixed order, which ends where contacts have one
-equilibrium.
-
-Where friction slips on the way, and where a contact that closes then sticks, depends on the path of the loads, which a
-static solution does not follow. So elements with friction have to keep their states.
-
-Source: K. G. Murty, Note on a Bard-type scheme for solving the complementarity problem, Opsearch 11 (1974).
-
-Switching: the PostStep user function of a system, which handles the events of all its Multi-Phi bodies.
-
-Exudyn has one such function per system. All bodies share it. A function that the user installed before the first body
-is called after the bodies, with the coordinates and levels that they have written. A function that is installed later
-replaces this one; ``check_called`` detects a run that ends without it.
-
+Exudyn has one PostStep user function per system, which handles the events of all its Multi-Phi bodies. A function that
+the user installed before the first body is called after the bodies, with the coordinates and levels that they have
+written. A function that is installed later replaces this one; ``check_called`` detects a run that ends without it.
 While every body knows the time of its next action, the function only compares the present time with the earliest one.
-
-Run checks: requirements of a body on the solver, on its step size, and on the system at the start of a run.
-
-SolveDynamic with Multi-Phi bodies: their requirements on the solver are checked before it starts.
 
 Exudyn wraps an error that a body raises during a run in an error about user functions. Therefore SolveDynamic checks
 beforehand, as a method of the system and as a function of Exudyn's modules, and so does the explicit solver when it is
 called itself; errors of bodies during a run are raised without Exudyn's wrapping. Any run of the implicit solver in
-which the bodies were not called up to its end raises an error at its end. A static solution is repeated until the
-levels of the bodies agree with it (above).
+which the bodies were not called up to its end raises an error at its end.
 
-Binding of Create functions to Exudyn's MainSystem, so that they read as Exudyn's own: ``mbs.CreateX(...)``.
+A static solution ends in the level whose contacts and reactions agree with it. Exudyn solves with the matrices of one
+level. There every signal of an exit has to be at least zero: gaps of open contacts, forces of closed ones, the distance
+of a force law to the ends of its segment, and the reserve of friction that sticks. Where some are negative, the element
+of the most negative one, relative to its terms, takes the exit and Exudyn solves again. If this does not end, the first
+of them does, in a fixed order, which ends where contacts have one equilibrium. Where friction slips on the way, and
+where a contact that closes then sticks, depends on the path of the loads, which a static solution does not follow. So
+elements with friction have to keep their states.
+
+Source: K. G. Murty, Note on a Bard-type scheme for solving the complementarity problem, Opsearch 11 (1974).
 """
 
 from __future__ import annotations
@@ -39,153 +28,25 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 import exudyn as exu
 import exudyn.solver
-import numpy as np
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError, NumericalFailure
-from multiphi_exudyn.exudyn_plugin.state import SAME_STEP, Coordinates
-from multiphi_exudyn.time.loaded_level import LoadedLevel
+from multiphi_exudyn.exudyn_plugin.body import MultiPhiBody
+from multiphi_exudyn.exudyn_plugin.state import SAME_STEP
 from multiphi_exudyn.time.model_warnings import CALLER, issue
 
-RESIDUAL = 1e-7  # of its terms: a signal that is less negative is the residual of the solver's iterations
-GREEDY = 5  # solutions for every element after which the element of the most negative signal takes its exit
-MOST = 20  # solutions for every element: more is an endless cycle
+__all__ = ["Switching", "bodies_of", "install_checks"]
+
 BODIES = "multiPhi"  # key in mbs.variables
-ROUND_OFF = 1e-12  # of the energy at the start: an impact with a smaller loss is none
+GREEDY = 5  # static solutions for every element after which the element of the most negative signal takes its exit
+MOST = 20  # static solutions for every element: more is an endless cycle
 IMPLICIT = (exu.DynamicSolverType.GeneralizedAlpha, exu.DynamicSolverType.TrapezoidalIndex2)
 _CHECKED = "_multiPhiChecked"  # attribute of a function that already checks
 
-
-class StaticChange(NamedTuple):
-    """Change of an element to a state that its signal asks for; signal: relative to its terms, from -1 to 0."""
-
-    signal: float
-    element: int
-    state: int
-
-
-class SolvedBody(Protocol):
-    """Attributes of a body that its static solution needs."""
-
-    name: str
-
-    @property
-    def elements(self) -> int:
-        """Number of contacts, force laws and friction elements."""
-
-    def begin_static(self) -> None:
-        """Begin with the level of the data node."""
-
-    def static_changes(self) -> list[StaticChange]:
-        """Changes of elements whose states do not agree with the present static solution."""
-
-    def change_static_level(self, change: StaticChange) -> None:
-        """Take the state of an element in the next static solution."""
-
-
-def solve_static(solve: Callable[[], bool], bodies: Iterable[SolvedBody]) -> bool:
-    """Solve until the levels of all bodies agree with the static solution; return whether the solver succeeded.
-
-    Raises NumericalFailure where no level agrees, and by the bodies where friction would change its state.
-    """
-    solved = tuple(bodies)
-    for body in solved:
-        body.begin_static()
-    count = sum(body.elements for body in solved)
-    for solution in range(1 + MOST * count):
-        if not solve():
-            return False
-        changes = [(body, change) for body in solved for change in body.static_changes()]
-        if not changes:
-            return True
-        greedy = solution < GREEDY * count
-        body, change = min(changes, key=lambda each: each[1].signal) if greedy else changes[0]
-        body.change_static_level(change)
-    raise NumericalFailure(
-        f"static solution of {body.name!r}: no level was found whose contacts agree with it; need more modes, "
-        "or start=model.equilibrium({point: force}) of the model in place of SolveStatic"
-    )
-
-
-def static_changes(body: str, level: LoadedLevel, xi: np.ndarray, reactions: np.ndarray) -> list[StaticChange]:
-    """Changes of elements whose exits have negative signals at rest, in the order of the elements.
-
-    xi: coordinates of the level. reactions: L f (k,) [N] of its links to forces on points, which xi does not contain.
-    Raises MultiPhiValueError where friction would change its state, or slips at rest.
-    """
-    base, changes = level.level.base, []
-    for (element, exit_), (place, _, constant) in zip(level.exits, level.signals, strict=True):
-        shares = [share * reactions[link] for link, share in level.force_shares(element, exit_)]
-        terms = np.array([*(place * xi), constant, *shares])
-        signal, size = float(np.sum(terms)), float(np.sum(np.abs(terms)))
-        comes_to_rest = exit_.asked == "stick" and level.state_of(element).event == "slip"
-        if signal >= -RESIDUAL * size and not (comes_to_rest and signal <= 0):
-            continue
-        if any(base.links[link].held for link in base.link_indices[element]):
-            name = base.contacts[element].name
-            raise MultiPhiValueError(
-                f"static solution of {body!r}: got forces that change the state of {name!r}, whose friction depends on "
-                "their path; need start=model.equilibrium({point: force}), or a damped run that comes to rest"
-            )
-        changes.append(StaticChange(signal / size, element, level.asked_state(element, exit_)))
-    return changes
-
-
 StepFunction = Callable[[Any, float], bool]
-
-
-class SwitchingBody(Protocol):
-    """Attributes of a body, and its functions that are called before and after steps."""
-
-    name: str
-    items: dict[str, Any]
-
-    @property
-    def next_time(self) -> float:
-        """Time [s] of its next action, -inf for an action at the end of every step."""
-
-    @property
-    def is_step_clear(self) -> Callable[[float], int] | None:
-        """Function of the end of a step [s], nonzero if the body needs no action; None where ``next_time`` decides."""
-
-    @property
-    def rigid(self) -> bool:
-        """Whether it has rigid contacts."""
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings about the accuracy of the run, a sentence each."""
-
-    def before_step(self, mbs: Any, t: float) -> None:
-        """Act before a step that ends at t [s]."""
-
-    def after_step(self, mbs: Any, t: float) -> None:
-        """Act at the end of a step at t [s], and at the start of a run."""
-
-    def restart_step(self) -> None:
-        """Take the present state as the start of the next step."""
-
-    def take_steps(self, mbs: Any, duration: float, step: float) -> None:
-        """Take notice of a run of this duration in steps of this length [s], in which it was not called."""
-
-    def end_run(self) -> None:
-        """Act at the end of a run."""
-
-    @property
-    def elements(self) -> int:
-        """Number of contacts, force laws and friction elements."""
-
-    def begin_static(self) -> None:
-        """Begin a static solution."""
-
-    def static_changes(self) -> list[StaticChange]:
-        """Changes of elements whose states do not agree with the static solution."""
-
-    def change_static_level(self, change: StaticChange) -> None:
-        """Take the state of an element in the next static solution."""
 
 
 class Clock:
@@ -210,12 +71,11 @@ class Clock:
         return self.switch(mbs, t)
 
 
-class Switching(dict[str, SwitchingBody]):
+class Switching(dict[str, MultiPhiBody]):
     """Bodies of one system by name, and their common PreStep and PostStep user functions.
 
     user_pre_step, user_post_step: the user's own functions, or None. is_required: whether a body needs these calls.
-    others_disturbed: whether an event has just changed what is attached to a body, which may be another body. end_time:
-    of the run [s], infinite once its warnings are issued. clock: has the function that is installed as PostStep.
+    end_time: of the run [s], infinite once its warnings are issued. clock: has the function installed as PostStep.
     """
 
     def __init__(self) -> None:
@@ -223,11 +83,10 @@ class Switching(dict[str, SwitchingBody]):
         self.user_pre_step: StepFunction | None = None
         self.user_post_step: StepFunction | None = None
         self.is_required = False
-        self.others_disturbed = False
         self.end_time = math.inf
         self.clock = Clock(self._switch)
 
-    def add(self, body: SwitchingBody) -> None:
+    def add(self, body: MultiPhiBody) -> None:
         """Add a body; those with rigid contacts come last, after the events of the parts that they strike."""
         self[body.name] = body
         for other in [each for each in self.values() if each.rigid]:
@@ -242,12 +101,16 @@ class Switching(dict[str, SwitchingBody]):
     def _switch(self, mbs: Any, t: float) -> bool:
         """Handle a step after which a body may have to act, or the start of a run."""
         self.clock.time, self.clock.next_time = t, -math.inf
-        for body in self.values():
-            body.after_step(mbs, t)
-        if self.others_disturbed and len(self) > 1:  # the body of the event is up to date
+        solver = running_solver(mbs, t, self)
+        if solver is None:
             for body in self.values():
+                body.set_static_level(mbs)
+        elif solver.it.currentStepIndex == 0:
+            self._begin(mbs, t, solver)
+        else:
+            moved = [body.after_step(mbs, t) for body in self.values()]
+            for body in self.values() if any(moved) and len(moved) > 1 else ():  # another body may be what has moved
                 body.restart_step()
-        self.others_disturbed = False
         if t >= self.end_time:
             self.end_time = math.inf
             for body in self.values():
@@ -259,14 +122,38 @@ class Switching(dict[str, SwitchingBody]):
             self.clock.is_step_clear = _combined_check(tests)
         return self.user_post_step is None or self.user_post_step(mbs, t)
 
+    def _begin(self, mbs: Any, t: float, solver: Any) -> None:
+        """Begin a run at t [s]."""
+        for body in self.values():
+            exclusive = {
+                mbs.GetNodeODE2Index(other.items["nGenericODE2"]): other.name
+                for other in self.values()
+                if other is not body and body.rigid and other.rigid
+            }
+            body.begin(mbs, t, self._is_isolated(mbs, body), exclusive)
+        end = float(mbs.sys["simulationSettings"].timeIntegration.endTime)
+        self.end_time = end - SAME_STEP * float(solver.it.currentStepSize)
+
+    def _is_isolated(self, mbs: Any, body: MultiPhiBody) -> bool:
+        """Whether no item of the system refers to a body or its node, and no user function may change them."""
+        node, item = body.items["nGenericODE2"], body.items["oGenericODE2"]
+        before = _user_function("PreStep", mbs.GetPreStepUserFunction())
+        if self.user_post_step or self.user_pre_step or before not in (None, self.before_step):
+            return False
+        if not self.is_installed(mbs) or mbs.GetPostNewtonUserFunction():
+            return False
+        parameters = mbs.GetObject(item)
+        if any(parameters[key] for key in parameters if key.endswith("UserFunction")):
+            return False
+        data = mbs.systemData
+        markers = (mbs.GetMarker(exu.MarkerIndex(i)) for i in range(data.NumberOfMarkers()))
+        others = (mbs.GetObject(exu.ObjectIndex(i)) for i in range(data.NumberOfObjects()) if i != int(item))
+        return not any(_refers_to(other, node, item) for other in itertools.chain(markers, others))
+
     def begin_run(self) -> None:
         """Begin a run of a solver."""
-        self.clock.time, self.clock.next_time, self.clock.is_step_clear, self.end_time = (
-            math.nan,
-            -math.inf,
-            None,
-            math.inf,
-        )
+        self.clock.time, self.clock.next_time, self.clock.is_step_clear = math.nan, -math.inf, None
+        self.end_time = math.inf
 
     def take_steps(self, mbs: Any, duration: float, count: int) -> None:
         """Take notice of a run of this duration [s] in so many steps, in which the bodies were not called; warn."""
@@ -327,12 +214,11 @@ def bodies_of(mbs: Any) -> Switching:
     return mbs.variables.setdefault(BODIES, Switching())
 
 
-def running_solver(mbs: Any, t: float) -> Any:
+def running_solver(mbs: Any, t: float, bodies: Mapping[str, Any]) -> Any:
     """The implicit dynamic solver that is running at time t [s], None inside SolveStatic."""
     dynamic = mbs.sys.get("dynamicSolver")
     if _is_running(dynamic, t):
-        implicit = isinstance(dynamic, exu.MainSolverImplicitSecondOrder)
-        check_solver(implicit, type(dynamic).__name__, bodies_of(mbs))
+        check_solver(isinstance(dynamic, exu.MainSolverImplicitSecondOrder), type(dynamic).__name__, bodies)
         return dynamic
     if not _is_running(mbs.sys.get("staticSolver"), t):
         raise MultiPhiValueError("SolveDynamic: got a solver that is not stored, need storeSolver=True")
@@ -348,23 +234,6 @@ def check_solver(implicit: bool, name: str, bodies: Mapping[str, Any]) -> None:
         )
 
 
-def is_isolated(mbs: Any, node: Any, body: Any) -> bool:
-    """Whether no item of the system refers to a node or its body, and no user function may change them."""
-    bodies = bodies_of(mbs)
-    before = _user_function("PreStep", mbs.GetPreStepUserFunction())
-    if bodies.user_post_step or bodies.user_pre_step or before not in (None, bodies.before_step):
-        return False
-    if not bodies.is_installed(mbs) or mbs.GetPostNewtonUserFunction():
-        return False
-    parameters = mbs.GetObject(body)
-    if any(parameters[key] for key in parameters if key.endswith("UserFunction")):
-        return False
-    data = mbs.systemData
-    markers = (mbs.GetMarker(exu.MarkerIndex(i)) for i in range(data.NumberOfMarkers()))
-    others = (mbs.GetObject(exu.ObjectIndex(i)) for i in range(data.NumberOfObjects()) if i != int(body))
-    return not any(_refers_to(item, node, body) for item in itertools.chain(markers, others))
-
-
 def _refers_to(item: Mapping[str, Any], node: Any, body: Any) -> bool:
     nodes = [item.get("nodeNumber"), *item.get("nodeNumbers", ())]
     bodies = [item.get("bodyNumber"), item.get("objectNumber"), *item.get("bodyNumbers", ())]
@@ -375,85 +244,6 @@ def _refers_to(item: Mapping[str, Any], node: Any, body: Any) -> bool:
 
 def _is_running(solver: Any, t: float) -> bool:
     return solver is not None and not solver.output.finishedSuccessfully and solver.it.currentTime == t
-
-
-class CheckedBody(Protocol):
-    """Attributes of a body that the checks need; matched_step: step size [s] its modes are matched to, or None."""
-
-    name: str
-    items: dict[str, Any]
-    coordinates: Coordinates
-    matched_step: float | None
-
-
-def check_matched(body: CheckedBody, step: float) -> None:
-    """Raise where modes are matched to another step size than this one [s]."""
-    if body.matched_step is not None and abs(step - body.matched_step) > SAME_STEP * step:
-        raise MultiPhiValueError(
-            f"matchedStepSize of {body.name!r}: got {body.matched_step:g} s and a solver's step of "
-            f"{step:g} s, need the same (beside Exudyn's own contacts set discontinuous.useRecommendedStepSize=False)"
-        )
-
-
-def check_level(body: CheckedBody, states: tuple[int, ...], last_states: tuple[int, ...], last: np.ndarray) -> None:
-    """Raise for a start at the coordinates (s,) of the last solution in another level than its own.
-
-    states, last_states: of the elements at the start, and in the last solution.
-    """
-    if states != last_states and np.array_equal(body.coordinates.views[0], last):
-        raise MultiPhiValueError(
-            f"start of {body.name!r}: got the coordinates of the last solution without its level, need its whole "
-            "state: updateInitialValues=True, or "
-            "mbs.systemData.SetSystemState(mbs.systemData.GetSystemState(), exu.ConfigurationType.Initial)"
-        )
-
-
-def check_integration(body: CheckedBody, settings: Any, trapezoidal: bool) -> None:
-    """Raise for settings of an implicit solver with which a body is not exact or unstable.
-
-    trapezoidal: whether the solver is TrapezoidalIndex2, which does not use the settings of GeneralizedAlpha.
-    """
-    integration, interface = settings.timeIntegration.generalizedAlpha, body.coordinates.interface
-    if not (trapezoidal or integration.useNewmark) and integration.spectralRadius != 1:
-        other = "" if interface is not None else " (or spectralRadius = 1)"
-        raise MultiPhiValueError(
-            f"solver: got GeneralizedAlpha with spectralRadius {integration.spectralRadius:g} (Exudyn's default is "
-            f"0.9), with which events of the Multi-Phi body {body.name!r} are not exact; need TrapezoidalIndex2"
-            f"{other}: mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)"
-        )
-    if interface is not None and not (trapezoidal or integration.useIndex2Constraints):
-        raise MultiPhiValueError(
-            f"solver: got GeneralizedAlpha of index 3, with which the interface of {body.name!r} is unstable; need "
-            "TrapezoidalIndex2: mbs.SolveDynamic(settings, solverType=exu.DynamicSolverType.TrapezoidalIndex2)"
-        )
-
-
-def check_start(mbs: Any, body: CheckedBody, start: Sequence[np.ndarray], loss: float) -> None:
-    """Raise for masses and constraints that cannot take part in impacts of a body with rigid contacts.
-
-    start: q, q' (s,) at creation; loss: energy loss of the impacts there [J].
-    """
-    coordinates = body.coordinates
-    system = coordinates.system or coordinates.system_around(mbs)
-    if system.acts_on_body(coordinates.stepped.mass):
-        raise MultiPhiValueError(
-            f"node of {body.name!r}: got a mass or a constraint on the node of a body with rigid contacts, need it "
-            "on an interface coordinate or as part of the structure, or contacts of finite stiffness"
-        )
-    system.exclusive_bodies = {
-        mbs.GetNodeODE2Index(other.items["nGenericODE2"]): other.name
-        for other in bodies_of(mbs).values()
-        if other is not body and other.rigid
-    }
-    inertia = system.attached_parts(system.copy_state(), coordinates.stepped.mass).inertia
-    q_t = coordinates.views[1]
-    as_created = np.array_equal(coordinates.views[:2], start)
-    has_impact = as_created and loss > ROUND_OFF * (loss + 0.5 * float(q_t @ q_t))
-    if has_impact and np.any(inertia.impedance(np.eye(len(inertia.mass)))):
-        raise MultiPhiValueError(
-            f"start of {body.name!r}: got a velocity into a rigid contact, with masses or constraints on the "
-            "interface, need a start without an impact"
-        )
 
 
 def install_checks() -> None:
@@ -482,7 +272,7 @@ def _with_check(solve: Callable[..., Any]) -> Callable[..., Any]:
             kind = settings.timeIntegration.solverType if solverType is None else solverType
             check_solver(kind in IMPLICIT, kind.name, bodies)
             for body in bodies.values():
-                check_integration(body, settings, trapezoidal=kind == exu.DynamicSolverType.TrapezoidalIndex2)
+                body.check_integration(settings, trapezoidal=kind == exu.DynamicSolverType.TrapezoidalIndex2)
         with _unwrapped_errors():
             return solve(mbs, simulationSettings, solverType, *arguments, **keywords)
 
@@ -562,18 +352,25 @@ def _unwrapped_errors() -> Iterator[None]:
         raise
 
 
-def bind(function: Callable[..., Any]) -> None:
-    """Make ``function(mbs, ...)`` a method of ``mbs``, unless Exudyn has a method of this name itself.
+def solve_static(solve: Callable[[], bool], bodies: Iterable[MultiPhiBody]) -> bool:
+    """Solve until the levels of all bodies agree with the static solution; return whether the solver succeeded.
 
-    Exudyn's registry is used if it exists, else a plain class attribute.
+    Raises NumericalFailure where no level agrees, and by the bodies where friction would change its state.
     """
-    name = function.__name__
-    if hasattr(exu.MainSystem, name):
-        return
-    try:
-        from exudyn.misc.extensionRegistry import extends, install
-    except ImportError:
-        setattr(exu.MainSystem, name, function)
-        return
-    extends(exu.MainSystem, name)(function)
-    install()
+    solved = tuple(bodies)
+    for body in solved:
+        body.begin_static()
+    count = sum(body.elements for body in solved)
+    for solution in range(1 + MOST * count):
+        if not solve():
+            return False
+        changes = [(body, change) for body in solved for change in body.static_changes()]
+        if not changes:
+            return True
+        greedy = solution < GREEDY * count
+        body, change = min(changes, key=lambda each: each[1].signal) if greedy else changes[0]
+        body.change_static_level(change)
+    raise NumericalFailure(
+        f"static solution of {body.name!r}: no level was found whose contacts agree with it; need more modes, "
+        "or start=model.equilibrium({point: force}) of the model in place of SolveStatic"
+    )

@@ -27,6 +27,8 @@ from multiphi_exudyn.exudyn_plugin.system import (
 )
 from multiphi_exudyn.exudyn_plugin.timed import PrescribedMotion, check_offsets, prescribed_motions
 
+__all__ = ["moved_onto_constraints", "violated_constraints"]
+
 MET = 1e-12  # of the largest coordinate: a smaller shift is round-off
 VIOLATED = 1e-6  # of the same: a larger violation is more than the error of a solver
 MOST = 20  # iterations of Newton's method

@@ -1,21 +1,17 @@
-"""Level data: the numbers in the data node of a body, which describe its level.
-
-(c,)      number of every element's state: of a contact 0 open, 1 closed
-(e,)      phase of every exit: 0 armed, 1 recovering, 2 refused, 3 held back; zeros beyond the exits of the level
-(h,) [m]  stick positions of the links that have one
-
-Coordinates: the part of an Exudyn system that belongs to a body: q, q', q'', matrices, and its data node.
+"""State of a body in an Exudyn system: its coordinates and matrices, its data node, and what it keeps of a run.
 
     M q'' + D q' + K q = drive + p
 
-The system has the matrices of the level ``stepped``. p (s,) is the modal force of the body's own varying loads and of
-the system's loads and connectors: those on the body's node, and those on its interface as forces f (m,) on points.
+The system has the matrices of the level ``discretised``. p (s,) is the modal force of the body's own varying loads and
+of the system's loads and connectors: those on the body's node, and those on its interface as forces f (m,) on points.
+The data node describes the level:
 
-Record of a run in Exudyn: levels and energies, from which the warnings of a body are derived (run_warnings.py).
+    (c,)      number of every element's state: of a contact 0 open, 1 closed
+    (e,)      phase of every guard: 0 armed, 1 recovering, 2 refused, 3 held back; zeros beyond those of the level
+    (h,) [m]  stick positions of the links that have one
 
-Step errors: how far the trapezoidal rule changes the motion of modes that are not matched to its step h.
-
-It lowers the frequency of a mode, so after a time t its phase lags by
+The trapezoidal rule changes the motion of modes that are not matched to its step h: it lowers the frequency of a mode,
+so after a time t its phase lags by
 
     phi = (omega - (2/h) arctan(omega h/2)) t,   about omega t (omega h)^2 / 12
 
@@ -33,16 +29,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import exudyn as exu
 import numpy as np
 
 from multiphi_exudyn.display import per_cent
-from multiphi_exudyn.exudyn_plugin.attached import SystemMatrices
-from multiphi_exudyn.exudyn_plugin.discretised_level import SteppedLevel
+from multiphi_exudyn.errors import MultiPhiValueError
+from multiphi_exudyn.exudyn_plugin.discretised_level import DiscretisedLevel
 from multiphi_exudyn.exudyn_plugin.interface import Interface
+from multiphi_exudyn.exudyn_plugin.own_loads import OwnLoads
 from multiphi_exudyn.levels.level.level import Level
 from multiphi_exudyn.levels.model.model import MultiPhiModel
 from multiphi_exudyn.mathematics.bounded_cache import BoundedCache
@@ -51,6 +47,8 @@ from multiphi_exudyn.time.law_warnings import LawPlaces
 from multiphi_exudyn.time.loaded_level import LoadedLevel
 from multiphi_exudyn.time.run_warnings import RunSummary
 from multiphi_exudyn.time.state import Loss, Phase, State
+
+__all__ = ["SAME_STEP", "BodyParts", "RunRecord", "StepErrors", "matrices"]
 
 PHASES = tuple(Phase)
 ONE = np.ones(1)  # the entry 1 of x = (q, q', q'', 1, f)
@@ -97,44 +95,34 @@ class LevelData:
         return states, tuple(PHASES[round(phase)] for phase in phases), self.held(data).copy()
 
 
-@dataclass(frozen=True)
-class ExternalForces:
-    """External forces (p, f) (s + m,) on a body, and the forces or accelerations (n,) of the system they come from."""
-
-    forces: np.ndarray
-    system_values: np.ndarray
-
-
 class Coordinates:
     """Coordinates (s,) of one body in an Exudyn system.
 
-    items: typed indices of the body's items. stepped: level whose matrices the system has. held: stick positions (h,)
-    [m] in the interface. layout: of the data node. interface: its interface coordinates, or None.
+    items: typed indices of the body's items. discretised: level whose matrices the system has. held: stick positions
+    (h,) [m] in the interface. layout: of the data node. interface: its interface coordinates, or None.
     max_levels: number of levels of which Exudyn's own matrices are kept. matched: whether M differs among levels.
-    During a run, system: the system around the body, if it has an interface; views: of q, q', q'' in the system's
-    current state; multipliers: view of all multipliers.
-    rigid: whether the body has rigid links. has_friction: whether links have stick positions. depends_on_later_forces:
-    whether an event depends on the forces right after it, as reactions do, and the direction in which friction slips.
+    During a run, first: index of its first coordinate in the system; views: of q, q', q'' in the system's current
+    state; multipliers: view of all multipliers.
+    rigid: whether the body has rigid links. has_friction: whether links have stick positions.
     """
 
     def __init__(
         self,
         items: dict[str, Any],
-        stepped: SteppedLevel,
+        discretised: DiscretisedLevel,
         held: np.ndarray,
         layout: LevelData,
         max_levels: int,
         matched: bool,
     ) -> None:
         self.items = items
-        self.stepped, self.held, self.layout = stepped, held, layout
-        self.rigid = bool(np.any(np.isinf(stepped.loaded.level.base.stiffnesses)))
+        self.discretised, self.held, self.layout = discretised, held, layout
+        self.rigid = bool(np.any(np.isinf(discretised.loaded.level.base.stiffnesses)))
         self.has_friction = layout.held_count > 0
-        self.depends_on_later_forces = self.rigid or self.has_friction
         self._matched = matched
         self._prepared = BoundedCache[tuple[int, ...], dict[str, Any]](max_levels)
         self.interface: Interface | None = None
-        self.system: SystemMatrices | None = None
+        self.first = 0
         self.views: tuple[np.ndarray, ...] = ()
         self.multipliers = np.zeros(0)
 
@@ -145,22 +133,16 @@ class Coordinates:
 
     def attach(self, mbs: Any) -> None:
         """Take the views of the system's current state; they are valid for one run."""
-        state, size = mbs.systemData.GetSystemStateDict(reference=True), self.stepped.size
-        first = mbs.GetNodeODE2Index(self.items["nGenericODE2"])
-        self._indices, self._count = slice(first, first + size), len(state["ODE2Coords"])
-        self.views = tuple(state[key][self._indices] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
+        state, size = mbs.systemData.GetSystemStateDict(reference=True), self.discretised.size
+        self.first = mbs.GetNodeODE2Index(self.items["nGenericODE2"])
+        own = slice(self.first, self.first + size)
+        self.views = tuple(state[key][own] for key in ("ODE2Coords", "ODE2Coords_t", "ODE2Coords_tt"))
         self.multipliers = state["AECoords"]
         if self.interface is not None:
             self.interface.attach(state)
-            self.system = self.system_around(mbs)
         if "nGenericData" in self.items:
             indices = mbs.systemData.GetNodeLTGData(self.items["nGenericData"])
             self._data = state["dataCoords"][indices[0] : indices[0] + len(indices)]
-
-    def system_around(self, mbs: Any) -> SystemMatrices:
-        """The system around the body."""
-        body, interface = range(self._indices.start, self._indices.stop), self.interface
-        return SystemMatrices(mbs, body, interface.indices if interface else (), interface.ties if interface else ())
 
     def copy_state(self) -> np.ndarray:
         """A copy x = (q, q', q'', 1, f) of the present state."""
@@ -168,87 +150,44 @@ class Coordinates:
             return np.concatenate([*self.views, ONE])
         return np.concatenate([*self.views, ONE, self.interface.forces])
 
-    def external_force(self, x: np.ndarray) -> np.ndarray:
-        """External forces (p, f) of a state x, by the equation of motion."""
-        count = 3 * self.stepped.size + 1
-        return np.concatenate([self.stepped.external_force_matrix.dot(x[:count]), x[count:]])
-
-    def split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """q, q', q'' of x."""
-        s = self.stepped.size
-        return x[:s], x[s : 2 * s], x[2 * s : 3 * s]
-
-    def write(self, stepped: SteppedLevel, held: np.ndarray, values: Iterable[np.ndarray]) -> None:
+    def write(self, discretised: DiscretisedLevel, held: np.ndarray, values: Iterable[np.ndarray]) -> None:
         """Write q, q', q'' (s,) of a level with stick positions (h,) [m], and the interface coordinates they give."""
         q, q_t, q_tt = self.views
         q[:], q_t[:], q_tt[:] = values
         if self.interface is not None:
-            self.interface.write(stepped, held, self.views)
+            self.interface.write(discretised, held, self.views)
 
-    def set_level(self, mbs: Any, stepped: SteppedLevel, force: np.ndarray) -> None:
+    def set_level(self, mbs: Any, discretised: DiscretisedLevel, force: np.ndarray) -> None:
         """Give the system the matrices of a level and the force vector (s,) of the body."""
-        self.stepped = stepped
-        links = stepped.loaded.level.indices
-        prepared = self._prepared.get_or_build(links, lambda: _containers(stepped))
+        self.discretised = discretised
+        links = discretised.loaded.level.indices
+        prepared = self._prepared.get_or_build(links, lambda: _containers(discretised))
         for parameter, value in prepared.items():
             mbs.SetObjectParameter(self.items["oGenericODE2"], parameter, value)
         mbs.SetObjectParameter(self.items["oGenericODE2"], "forceVector", force)
         if self.interface is not None:
-            self.interface.set_level(stepped, self.held)
+            self.interface.set_level(discretised, self.held)
 
-    def set_level_in_run(self, mbs: Any, stepped: SteppedLevel, force: np.ndarray) -> None:
+    def set_level_in_run(self, mbs: Any, discretised: DiscretisedLevel, force: np.ndarray) -> None:
         """``set_level`` within a run of the dynamic solver."""
-        self.set_level(mbs, stepped, force)
+        self.set_level(mbs, discretised, force)
         if self._matched:  # a solver may keep a mass matrix that it takes for constant
             mbs.sys["dynamicSolver"].ComputeMassMatrix(mbs)
         mbs.solverSignalJacobianUpdate = True
 
-    def set_level_if_changed(self, mbs: Any, stepped: SteppedLevel, held: np.ndarray, force: np.ndarray) -> None:
+    def set_level_if_changed(
+        self, mbs: Any, discretised: DiscretisedLevel, held: np.ndarray, force: np.ndarray
+    ) -> None:
         """Set a level with stick positions (h,) [m] within a run, if either differs from the present one."""
-        if stepped.states != self.stepped.states or np.any(held != self.held):
+        if discretised.states != self.discretised.states or np.any(held != self.held):
             self.held = held
-            self.set_level_in_run(mbs, stepped, force)
+            self.set_level_in_run(mbs, discretised, force)
 
-    def external_modal_force(self, mbs: Any) -> np.ndarray:
-        """Modal force p (s,) in the present state of the system, for a body without interface."""
-        return self.external_forces(mbs, self.stepped).forces
-
-    def external_forces(self, mbs: Any, written: SteppedLevel) -> ExternalForces:
-        """Forces (p, f) of loads and connectors in the present state of the system, and the forces (n,) of the system.
-
-        written: the level whose coordinates are in the system; its matrices may be those of another one.
-        """
-        solver = mbs.sys["dynamicSolver"]
-        solver.ComputeODE2RHS(mbs)
-        system_forces = np.array(solver.GetSystemResidual())[: self._count]
-        modal = system_forces[self._indices] + self.stepped.internal_force(*self.views[:2])
-        if self.interface is None:
-            return ExternalForces(modal, system_forces)
-        points = system_forces[self.interface.indices]
-        rows = self.interface.map_in(written).rows
-        return ExternalForces(np.concatenate([modal + points @ rows, points]), system_forces)
-
-    def forces_from_accelerations(self, accelerations: np.ndarray) -> ExternalForces:
-        """External forces (p, f) in the present state, for accelerations (n,) of the system and its multipliers."""
-        assert self.interface is not None
-        q, q_t, _ = self.views
-        x = np.concatenate([q, q_t, accelerations[self._indices], ONE, self.interface.forces])
-        return ExternalForces(self.external_force(x), accelerations)
-
-    def set_tie_forces(self, forces: np.ndarray) -> None:
-        """Write f (m,) as the multipliers of the ties."""
-        assert self.interface is not None
-        self.multipliers[self.interface.multipliers] = forces
-
-    def transform_force(self, force: np.ndarray, source: SteppedLevel, target: SteppedLevel) -> np.ndarray:
-        """Forces (p, f) of one level in another: forces on points stay the same."""
-        return force if self.interface is None else self.interface.transform_force(force, source, target)
-
-    def direct_reactions(self, stepped: SteppedLevel) -> np.ndarray:
+    def direct_reactions(self, discretised: DiscretisedLevel) -> np.ndarray:
         """L (k, m) in a level: L f [N] are reactions of the closed contacts to f that its modes do not contain."""
         if self.interface is None:
-            return np.zeros((len(stepped.loaded.level.indices), 0))
-        return self.interface.map_in(stepped).direct_reactions
+            return np.zeros((len(discretised.loaded.level.indices), 0))
+        return self.interface.map_in(discretised).direct_reactions
 
     def write_level_data(self, data: np.ndarray) -> None:
         """Write level data (width,) into the data node."""
@@ -260,19 +199,19 @@ class Coordinates:
         return self.layout.read(self._data if "nGenericData" in self.items else np.zeros(0))
 
 
-def matrices(stepped: SteppedLevel, force: np.ndarray) -> dict[str, np.ndarray]:
+def matrices(discretised: DiscretisedLevel, force: np.ndarray) -> dict[str, np.ndarray]:
     """Parameters of the ObjectGenericODE2 in a level."""
     return {
-        "massMatrix": stepped.mass,
-        "dampingMatrix": stepped.damping,
-        "stiffnessMatrix": stepped.stiffness,
+        "massMatrix": discretised.mass,
+        "dampingMatrix": discretised.damping,
+        "stiffnessMatrix": discretised.stiffness,
         "forceVector": force,
     }
 
 
-def _containers(stepped: SteppedLevel) -> dict[str, Any]:
+def _containers(discretised: DiscretisedLevel) -> dict[str, Any]:
     """Mass, damping and stiffness as Exudyn's own matrices, which are set without a conversion entry by entry."""
-    parameters = matrices(stepped, stepped.drive)
+    parameters = matrices(discretised, discretised.drive)
     del parameters["forceVector"]
     return {parameter: exu.MatrixContainer(value) for parameter, value in parameters.items()}
 
@@ -333,11 +272,11 @@ class StepErrors:
         """Include the present state of a body, at the start of the run or after an event at a time [s]."""
         if self._corrected:
             self._squares = self._squares_until(time)
-        stepped = coordinates.stepped
-        r, s = stepped.modes, stepped.size
-        eta, eta_t, eta_tt = np.split(stepped.to_physical @ np.concatenate(coordinates.views), 3)
-        vibrates = np.flatnonzero(stepped.squares[:r] > 0)
-        squares = stepped.squares[vibrates]
+        discretised = coordinates.discretised
+        r, s = discretised.modes, discretised.size
+        eta, eta_t, eta_tt = np.split(discretised.to_physical @ np.concatenate(coordinates.views), 3)
+        vibrates = np.flatnonzero(discretised.squares[:r] > 0)
+        squares = discretised.squares[vibrates]
         omega, moved = np.sqrt(squares), eta_t[vibrates] ** 2 / squares
         self._size = max(self._size, float(np.sum(eta[:s] ** 2) + np.sum(moved)))
         self._last = time, omega, (eta_tt[vibrates] / squares) ** 2 + moved
@@ -375,3 +314,45 @@ class StepErrors:
             f"coarse steps: the modes are not matched to steps of {step:g} s, {count:.3g} in the shortest kept period, "
             f"which delay the motion by an estimated {per_cent(float(errors[0]))} of it; {remedy}"
         )
+
+
+class BodyParts:
+    """What a body has whatever runs it: name, model, items, loads, levels, coordinates, and a record of its last run.
+
+    matched_step: step size [s] that its modes are matched to, or None. own_loads: in the present run.
+    """
+
+    def __init__(self, name: str, loads: OwnLoads, start: State, lost: Loss, matched_step: float | None) -> None:
+        self.name, self.model, self.matched_step = name, loads.loaded_levels.model, matched_step
+        self.items: dict[str, Any] = {}
+        self.own_loads, self.record = loads, RunRecord(start, lost)
+        self._step_errors: StepErrors | None = None
+        most = self.model.most_levels
+        self._discretised_levels = BoundedCache[tuple[int, ...], DiscretisedLevel](most)
+        layout, discretised = LevelData(self.model), self.discretised_level(start.states)
+        self.coordinates = Coordinates(self.items, discretised, start.held, layout, most, matched_step is not None)
+
+    @property
+    def varies(self) -> bool:
+        """Whether the body's loads vary in time."""
+        return self.own_loads.varies
+
+    def discretised_level(self, states: Sequence[int]) -> DiscretisedLevel:
+        """The solver's level in which the elements are in these states."""
+        key = tuple(states)
+        return self._discretised_levels.get_or_build(
+            key, lambda: self.own_loads.discretised_level(key, self.matched_step)
+        )
+
+    def check_step(self, step: float) -> None:
+        """Raise where modes are matched to another step size than this one [s]."""
+        if self.matched_step is not None and abs(step - self.matched_step) > SAME_STEP * step:
+            raise MultiPhiValueError(
+                f"matchedStepSize of {self.name!r}: got {self.matched_step:g} s and a solver's step of {step:g} s, "
+                "need the same (beside Exudyn's own contacts set discontinuous.useRecommendedStepSize=False)"
+            )
+
+    def include_step_error(self, time: float) -> None:
+        """Take notice of the present state, after an event at a time [s], for the estimate of the steps' error."""
+        if self._step_errors is not None:
+            self._step_errors.include(self.coordinates, time)

@@ -22,7 +22,28 @@ import scipy.linalg
 
 from multiphi_exudyn.exudyn_plugin.items import contact_parameters, user_function, value_key
 
+__all__ = [
+    "Change",
+    "Directions",
+    "changed",
+    "constraint_jacobian",
+    "coordinate_name",
+    "generalised_forces",
+    "initial_is_current",
+    "items_of",
+    "largest_coordinate_name",
+    "mass_matrix",
+    "object_name",
+    "on_velocities",
+    "residuals",
+    "sphere_gap",
+    "static_solver",
+    "without_contacts",
+]
+
 REDUNDANT = 1e-9  # of a constraint's row: a smaller part that is independent of other constraints is round-off
+
+Change = tuple[Any, str, Any, Any]  # of a parameter: index of its item, key, value, present value
 
 
 class Directions:
@@ -166,35 +187,44 @@ def sphere_gap(mbs: Any, index: int) -> tuple[float, np.ndarray]:
 
 
 @contextmanager
-def without_contacts(
-    mbs: Any, objects: Sequence[Mapping[str, Any]], loads: Sequence[Mapping[str, Any]]
-) -> Iterator[None]:
-    """Switch off contacts, limit stops, friction and loads by user functions; they are restored in any case."""
-    changes = [
-        (exu.ObjectIndex(i), name, off) for i, item in enumerate(objects) for name, off in contact_parameters(item)
-    ]
-    timed = {exu.LoadIndex(i): load for i, load in enumerate(loads) if user_function(load)}
+def changed(mbs: Any, changes: Sequence[Change]) -> Iterator[None]:
+    """Change parameters of objects and loads; they are restored in any case."""
     try:
-        for index, name, off in changes:
-            mbs.SetObjectParameter(index, name, off)
-        for i, load in timed.items():
-            value = load[value_key(load)]
-            mbs.SetLoadParameter(i, user_function(load), 0)
-            mbs.SetLoadParameter(i, value_key(load), 0 * np.array(value) if np.ndim(value) else 0.0)
+        for index, key, value, _ in changes:
+            _set_parameter(mbs, index, key, value)
         yield
     finally:
-        for index, name, _ in changes:
-            mbs.SetObjectParameter(index, name, objects[int(index)][name])
-        for i, load in timed.items():
-            for key in (value_key(load), user_function(load)):
-                mbs.SetLoadParameter(i, key, load[key])
+        for index, key, _, present in changes:
+            _set_parameter(mbs, index, key, present)
 
 
-def _object_name(item: Any) -> str:
+def _set_parameter(mbs: Any, index: Any, key: str, value: Any) -> None:
+    setter = mbs.SetLoadParameter if isinstance(index, exu.LoadIndex) else mbs.SetObjectParameter
+    setter(index, key, value)
+
+
+def without_contacts(
+    mbs: Any, objects: Mapping[int, Mapping[str, Any]], loads: Sequence[Mapping[str, Any]] = ()
+) -> Any:
+    """Switch off contacts, limit stops, friction and loads by user functions; objects: by index."""
+    changes: list[Change] = [
+        (exu.ObjectIndex(i), key, off, item[key])
+        for i, item in objects.items()
+        for key, off in contact_parameters(item)
+    ]
+    for i, load in enumerate(loads):
+        if user := user_function(load):
+            key = value_key(load)
+            zero = 0 * np.array(load[key]) if np.ndim(load[key]) else 0.0
+            changes += [(exu.LoadIndex(i), key, zero, load[key]), (exu.LoadIndex(i), user, 0, load[user])]
+    return changed(mbs, changes)
+
+
+def object_name(item: Any) -> str:
     return f"Object{item['objectType']} {item['name']!r}"
 
 
-def _largest_coordinate_name(mbs: Any, vector: np.ndarray) -> str:
+def largest_coordinate_name(mbs: Any, vector: np.ndarray) -> str:
     return coordinate_name(mbs, int(np.argmax(np.abs(vector))))
 
 
@@ -214,4 +244,4 @@ def coordinate_name(mbs: Any, index: int) -> str:
 def _bodies(mbs: Any, node: int) -> list[str]:
     items = [mbs.GetObject(exu.ObjectIndex(i)) for i in range(mbs.systemData.NumberOfObjects())]
     bodies = [item for item in items if node in [int(n) for n in item.get("nodeNumbers", [item.get("nodeNumber", -1)])]]
-    return [_object_name(item) for item in bodies]
+    return [object_name(item) for item in bodies]

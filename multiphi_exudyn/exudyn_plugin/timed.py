@@ -32,6 +32,18 @@ from multiphi_exudyn.mechanics.arguments import is_real
 from multiphi_exudyn.mechanics.loads import FunctionLoad, VaryingLoad
 from multiphi_exudyn.mechanics.time_functions import Smooth
 
+__all__ = [
+    "Component",
+    "PrescribedMotion",
+    "RateLoad",
+    "TimedLoad",
+    "check_offsets",
+    "function_loads",
+    "prescribed_motions",
+    "timed_forces",
+    "timed_loads",
+]
+
 SAMPLE_TIMES = np.concatenate(
     [[0.0], np.geomspace(1e-6, 1e3, 64)]
 )  # s after the reduction: times at which forces are compared

@@ -11,7 +11,7 @@ from small_structures import chain
 
 import multiphi_exudyn as mp
 import multiphi_exudyn._core as core
-from multiphi_exudyn.exudyn_plugin.interface import _direct_reactions
+from multiphi_exudyn.exudyn_plugin.interface import direct_reactions
 from multiphi_exudyn.levels.core_model import core_model
 from multiphi_exudyn.time.loaded_levels import LoadedLevels
 
@@ -41,7 +41,7 @@ def forces(model, point, force):
     def acting(states):
         level = model.level_at(model.active_links(states))
         rows = in_base @ level.vectors
-        return force * rows[0], force * _direct_reactions(level, in_base, rows)[:, 0]
+        return force * rows[0], force * direct_reactions(level, in_base, rows)[:, 0]
 
     return acting
 

@@ -20,8 +20,9 @@ from scipy.integrate import solve_ivp
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
-from multiphi_exudyn.exudyn_plugin.discretised_level import SteppedLevel
-from multiphi_exudyn.exudyn_plugin.step_test import OwnLoads
+from multiphi_exudyn.exudyn_plugin.discretised_level import DiscretisedLevel
+from multiphi_exudyn.exudyn_plugin.own_loads import OwnLoads
+from multiphi_exudyn.exudyn_plugin.step_test import conditions
 from multiphi_exudyn.levels.model import level_store
 from reference_models.body_alone import solve_body_alone
 from reference_models.rig import initial_displacement, rig_beam, rig_contact, rig_damping
@@ -300,13 +301,13 @@ def test_forces_and_springs_on_the_coordinates_converge_to_another_integrator():
 
 def test_later_bodies_of_a_model_answer_as_the_first_one_of_another_to_the_bit(monkeypatch):
     """What a solver needs of a level is kept with the model, by the step and by what it is matched to."""
-    built, of = [], SteppedLevel.of
+    built, of = [], DiscretisedLevel.of
 
     def counted(*given):
         built.append(given[1:])
         return of(*given)
 
-    monkeypatch.setattr(SteppedLevel, "of", counted)
+    monkeypatch.setattr(DiscretisedLevel, "of", counted)
     contacts = [mp.UnilateralContact("stop", "m2", 2e-3, 1e5)]
     kept = chain(contacts)
     for step, matched in ((1e-3, 1e-3), (2e-3, None), (1e-3, None), (2e-3, 2e-3)) * 2:
@@ -325,7 +326,7 @@ def test_conditions_of_a_step_are_kept_by_all_that_they_depend_on():
     for matched, step, carried in ((None, 1e-3, 0.0), (1e-3, 1e-3, 0.0), (None, 2e-3, 0.0), (None, 1e-3, 1.0)):
         loads = kept, OwnLoads(chain(contacts), (), 3, 0.0, 1.0)
         direct = np.full((1, 1), carried)
-        ours, anew = (each.conditions(each.stepped_level((1,), matched), step, direct) for each in loads)
+        ours, anew = (conditions(each, each.discretised_level((1,), matched), step, direct) for each in loads)
         assert np.array_equal(ours.ahead, anew.ahead)
         assert not any(np.array_equal(ours.ahead, other) for other in found)
         found.append(ours.ahead)

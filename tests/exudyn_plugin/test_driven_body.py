@@ -11,7 +11,7 @@ from small_structures import chain
 
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
-from multiphi_exudyn.exudyn_plugin.step_test import jump_times
+from multiphi_exudyn.exudyn_plugin.own_loads import jump_times
 from multiphi_exudyn.time.state import Phase
 from reference_models.exudyn_quiet import quiet
 from reference_models.solver_settings import fixed_steps

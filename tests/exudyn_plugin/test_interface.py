@@ -94,7 +94,7 @@ def run(model, step, add, interface=("m2",), solver=TRAPEZOIDAL, **given):
     level, layout = mbs.GetSensorStoredData(items["sLevel"])[:, 1:], body.coordinates.layout
     shown = np.empty((len(eta), len(sensors)))
     for k, (values, states, held) in enumerate(zip(eta, layout.states(level), layout.held(level), strict=True)):
-        loaded = body.stepped_level(states.tolist()).loaded
+        loaded = body.discretised_level(states.tolist()).loaded
         x = model.base.modes.shapes @ loaded.configuration(np.concatenate([values[: loaded.modal.modes], held]))
         shown[k] = [model.structure.row(name) @ x for name in items["nInterface"]]
     return np.column_stack([mbs.GetSensorStoredData(s)[:, 1] for s in sensors]), shown, body.events
@@ -300,7 +300,7 @@ def test_rates_of_interface_coordinates_are_those_of_the_body_at_every_step(stif
     assert len(body.events) >= 4
     for sensor, key in zip(sensors, ("sCoordinates_t", "sCoordinates_tt"), strict=True):
         own, y = mbs.GetSensorStoredData(items[key])[:, 1:], mbs.GetSensorStoredData(sensor)[:, 1]
-        shapes = [body.stepped_level((int(closed),)).loaded.level.shapes for closed in level]
+        shapes = [body.discretised_level((int(closed),)).loaded.level.shapes for closed in level]
         shown = np.array([point @ s @ q[: s.shape[1]] for s, q in zip(shapes, own, strict=True)])
         assert np.max(np.abs(y - shown)) < 1e-9 * np.max(np.abs(shown))
 

@@ -45,8 +45,8 @@ from test_interface import (
 )
 
 import multiphi_exudyn as mp
+import multiphi_exudyn._core as core
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody
-from multiphi_exudyn.exudyn_plugin.attached import AttachedInertia
 
 pytestmark = pytest.mark.usefixtures("quiet_exudyn")
 
@@ -524,7 +524,7 @@ def test_what_is_attached_gives_the_mobility_of_the_whole(seed, modes, points, h
     rows, factor = rng.normal(size=(points, modes)), rng.normal(size=(points, points))
     directions = np.linalg.qr(rng.normal(size=(points, points)))[0]
     mass, free = factor @ factor.T, directions[:, held:]
-    body = AttachedInertia(mass, free)
+    body = core.PointInertia(mass, free, rows)
     constraints = np.hstack([rows, -np.eye(points)]), np.hstack([np.zeros((held, modes)), directions[:, :held].T])
     jacobian = np.vstack(constraints)
     inertia = np.block([[np.eye(modes), np.zeros((modes, points))], [np.zeros((points, modes)), mass]])

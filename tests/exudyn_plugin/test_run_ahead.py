@@ -11,7 +11,7 @@ from small_structures import chain
 import multiphi_exudyn as mp
 from multiphi_exudyn.exudyn_plugin import CreateMultiPhiBody, body_histories
 from multiphi_exudyn.exudyn_plugin.alone import RunAhead, UndisturbedSteps
-from multiphi_exudyn.exudyn_plugin.discretised_level import SteppedLevel
+from multiphi_exudyn.exudyn_plugin.discretised_level import DiscretisedLevel
 from multiphi_exudyn.time.loaded_levels import LoadedLevels
 from multiphi_exudyn.time.state import Phase
 from reference_models.solver_settings import fixed_steps
@@ -89,7 +89,7 @@ def test_undisturbed_steps_are_those_of_exudyn(solver, matched):
     system = System(model, matchedStepSize=matched)
     system.solve(solver=solver)
     states = system.coordinates().reshape(501, 3, 3)
-    stepped = SteppedLevel.of(LoadedLevels.static(model, np.zeros(3)).level((0,) * len(model.contacts)), 3, matched)
+    stepped = DiscretisedLevel.of(LoadedLevels.static(model, np.zeros(3)).level((0,) * len(model.contacts)), 3, matched)
     first, counts = np.array([5, 5, 17, 40]), np.array([1, 20, 483, 0])
     reached = UndisturbedSteps(stepped, STEP).after(states[first], counts)
     assert np.allclose(reached, states[first + counts], rtol=0, atol=1e-9 * np.max(np.abs(states)))

@@ -1,5 +1,5 @@
 // Bindings of run.hpp and trajectory.hpp: runs from event to event, and their records as arrays.
-#include "bindings/bindings.hpp"
+#include "bindings/run.hpp"
 
 #include <nanobind/eigen/dense.h>
 #include <nanobind/ndarray.h>
@@ -33,13 +33,6 @@ using namespace nb::literals;
 namespace multiphi::bindings {
 
 namespace {
-
-// Why a run ended before its time, as a status.
-struct Failure {
-    Cause cause;
-    std::vector<int> elements;
-    std::array<double, 3> details;
-};
 
 // An array of its own with one value of every item.
 template <typename Value, typename Items, typename Get>
@@ -313,6 +306,7 @@ void bind_run(nb::module_& module) {
         },
         "levels"_a, "starts"_a, "window"_a, "allowed"_a, "time"_a, "end"_a, "threads"_a,
         "Many runs on several threads, each in its levels from its start.");
+    bind_coupled_step(module);
 }
 
 }  // namespace multiphi::bindings
