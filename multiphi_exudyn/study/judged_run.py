@@ -31,6 +31,7 @@ NODES = 6  # of Gauss quadrature, which integrates over an interval of at most o
 EVENTS = 20  # instants of events, and as many ends of segments
 EVEN = 10  # further instants, for the size of the motion
 INTERPOLATED = 1e-4  # of a sum's terms where a load is interpolated: to a tolerance of the motion, not of its force
+REST = 1e-3  # of the farthest rest position of a level: displacements are sums with it, and have its round-off
 FAR = 1e-2  # of the largest displacement: its round-off is that of what other masses do not move; of a load's largest
 # force the same, where it is about zero
 NO_MOTION = 1e-6  # of what the forces could move a free mass during the run: less is no motion
@@ -170,7 +171,9 @@ class JudgedRun:
         belts = [friction.velocity for friction in self.frictions] + [c.tangential_velocity for c in self.rough]
         carried = float(np.max(np.abs(belts), initial=0.0)) * float(np.max(self.root))
         velocity = NO_MOTION * float(np.max(np.abs(self.root * self.v_sides[1]), initial=0.0)) + self.idle
-        return largest + (carried + velocity) * self.trajectory.t_end
+        rests = [self.trajectory._asymptotic(level) for level in self.trajectory.segments.levels]
+        far = max(float(np.max(np.abs(self.root.ravel() * rest), initial=0.0)) for rest in rests)
+        return largest + REST * far + (carried + velocity) * self.trajectory.t_end
 
     @cached_property
     def speed(self) -> float:
