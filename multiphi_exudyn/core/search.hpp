@@ -52,9 +52,8 @@ class DescentSearch {
     // The first descent in (from, horizon].
     Descent first(const Exponentials& exponentials, const SearchedSignals& signals, double from, double horizon);
 
-    // Of the exponentials, in all searches that did not fail; set where a segment is computed again.
+    // Of the exponentials, in all searches that did not fail.
     long evaluations() const { return evaluations_; }
-    void set_evaluations(long evaluations) { evaluations_ = evaluations; }
 
   private:
     struct Start {

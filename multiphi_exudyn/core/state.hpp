@@ -53,7 +53,6 @@ class Mover {
     void move(const State& displaced, const Transition& by_displacement, const State& moving,
               const Transition& by_velocity, const Inputs& inputs, State& result);
     const Vector& displacement_sizes() const { return displacement_sizes_; }  // of the last move (n,)
-    const Vector& velocity_sizes() const { return velocity_sizes_; }
 
   private:
     Vector displacement_sizes_, velocity_sizes_;
