@@ -5,6 +5,7 @@ Sizes are those of the motion times the roots of the masses, so that a unit of l
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -189,7 +190,7 @@ class JudgedRun:
             forces = forces + abs(self.damping) @ v
         pushing = [(friction.name, friction.most) for friction in self.frictions]
         pushing += [(law.name, float(np.max(np.abs(law.force(self.rows[law.name] @ x))))) for law in self.laws]
-        pushing += [(c.name, c.stiffness * self._deepest(c)) for c in self.contacts if not c.rigid]
+        pushing += [(c.name, c.stiffness * self._deepest(c)) for c in self.contacts if math.isfinite(c.stiffness)]
         for name, force in pushing:
             forces = forces + force * np.abs(self.rows[name])[:, None]
         return float(np.max(forces / self.root, initial=0.0))
@@ -294,7 +295,7 @@ class JudgedRun:
         """Modes (n, r) of the level at an instant."""
         level = self.trajectory.segments[int(np.searchsorted(self.bounds, t, side="right")) - 1].level.modal
         if level.indices not in self._kept:
-            self._kept[level.indices] = level.shapes
+            self._kept[level.indices] = level.base.modes.shapes @ level.inertial
         return self._kept[level.indices]
 
 

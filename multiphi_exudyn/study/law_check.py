@@ -27,6 +27,7 @@ Every bound is relative to the absolute values of the terms that are summed.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -563,7 +564,7 @@ def _energy(run: JudgedRun, trajectory: Trajectory, t: float) -> tuple[float, fl
         energy += float(law.energy(run.rows[law.name] @ x))
     for contact in run.contacts:
         gap = float(run.rows[contact.name] @ x) + contact.gap - float(run.stop(contact, np.array([t]))[0][0])
-        stored = 0.0 if contact.rigid else 0.5 * contact.stiffness * min(0.0, gap) ** 2
+        stored = 0.5 * contact.stiffness * min(0.0, gap) ** 2 if math.isfinite(contact.stiffness) else 0.0
         force, spring = float(trajectory.contact_force(contact.name, t)), contact.stiffness * abs(gap)
         if contact.damping and force <= EXACT * spring:
             either += stored

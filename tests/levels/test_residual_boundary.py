@@ -26,6 +26,7 @@ from multiphi_exudyn import (
     UnilateralContact,
     simulate,
 )
+from multiphi_exudyn.study.law_check import broken_laws
 
 
 def bar(n, damping=None, points=None):
@@ -168,6 +169,16 @@ class TestEnergies:
         turned_over = found.ledger.damping + abs(found.ledger.work_of_loads)
         assert abs(found.ledger.residual) < 1e-9 * turned_over
         assert not any(warning.startswith("ledger") for warning in found.warnings)
+
+
+class TestTheJudge:
+    @pytest.mark.parametrize("stiffness", [60.0, math.inf])
+    def test_finds_no_law_broken(self, stiffness):
+        structure = bar(30, ModalDamping(0.01), points={f"p{i}": i for i in (9, 20, 29)})
+        stops = [UnilateralContact(f"s{i}", f"p{i}", 0.01, stiffness) for i in (9, 20, 29)]
+        x0 = 0.1 * np.sin(np.linspace(0.05, 1.4, 30))
+        found = simulate(MultiPhiModel(structure, stops, modes=6, boundary="residual"), 3.0, displacement=x0)
+        assert broken_laws(found) == []
 
 
 class TestFreeBodies:
