@@ -42,7 +42,6 @@ __all__ = ["ManyGiven", "ManyRuns", "StartVectors", "Task", "simulate_many"]
 BAR_DELAY = 2.0  # s before a progress bar appears
 KEPT = 8  # sets of levels under loads, one for each fineness of interpolation
 BATCH = 64  # runs of a batch, for each thread: a progress bar then moves
-MADE = 2048  # runs with numbers of their own that are kept, more than a batch has
 MOST_SEGMENTS = 2**20  # of a batch: they are kept in memory until its results have been read
 
 StartVectors: TypeAlias = "tuple[np.ndarray | None, np.ndarray | None]"  # x and x' (n,)
@@ -232,7 +231,7 @@ def _count(vary: Any) -> int | None:
 
 
 class ManyGiven(Sequence[Run]):
-    """The runs as they are given, each made when it is asked for: ``run`` with its start and its numbers of ``vary``.
+    """The runs as they are given, each made anew when it is asked for: ``run`` with its start and numbers of ``vary``.
 
     differ: whether they have other models or loads. An error names what is not there, or not possible.
     """
@@ -241,15 +240,11 @@ class ManyGiven(Sequence[Run]):
         self._run, self._starts = run, starts
         self._fields = [(_place(run, name), np.asarray(values, float)) for name, values in vary.items()]
         self.differ = bool(vary)
-        self._made = BoundedCache[int, Run](MADE)
 
     def __len__(self) -> int:
         return len(self._starts)
 
     def __getitem__(self, number: int) -> Run:  # type: ignore[override]
-        return self._made.get_or_build(number, lambda: self._make(number))
-
-    def _make(self, number: int) -> Run:
         x, x_t = self._starts[number]
         model, loads = self._run.model, self._run.loads
         contacts, varied_loads = list(model.contacts), list(loads)
@@ -314,6 +309,11 @@ def _checked(threads: int | None) -> int:
     return threads or os.cpu_count() or 1
 
 
+def _is_undecided(model: MultiPhiModel) -> bool:
+    """Whether a model with a Tolerance has yet to find its modes by a run."""
+    return isinstance(model.modes, Tolerance) and model.decided is None
+
+
 class Task:
     """Runs to be done, and their results; points: rows (n,); contacts: names.
 
@@ -329,16 +329,15 @@ class Task:
         self.forces, self.impulses, self.contact_times = np.full((*shape, len(times)), np.nan), *np.zeros((2, *shape))
         self.ends, self.events = np.zeros(count), np.zeros(count, int)
         self.results = [("failed", "", tuple[str, ...]())] * count
-        self._kept = BoundedCache[object, LoadedLevels](KEPT)
-        self._rules = BoundedCache[int, Starts](KEPT)
+        self._kept = None if runs.differ else BoundedCache[object, LoadedLevels](KEPT)
 
     def carry_out(self, threads: int, bar: Any) -> None:
         """Do all runs; the first ones, one after the other, decide the modes of a Tolerance."""
         numbers = list(range(len(self._runs)))
         alone = len(numbers) if refined(self._runs[0].loads) else 1  # a first run sets the size of batches
-        while numbers and (alone > 0 or self._is_undecided(numbers[0])):
-            segments = self._finish(numbers.pop(0), None)
-            alone -= 1
+        while numbers and (alone > 0 or _is_undecided(self._runs[numbers[0]].model)):
+            segments = self._finish(numbers[0], self._run(numbers[0]))
+            numbers, alone = numbers[1:], alone - 1
             bar.update()
         while numbers:
             count = max(threads, min(BATCH * threads, MOST_SEGMENTS // (segments + 1)))
@@ -346,47 +345,37 @@ class Task:
             segments = self._run_batch(batch, threads)
             bar.update(len(batch))
 
-    def _is_undecided(self, number: int) -> bool:
-        model = self._runs[number].model
-        return isinstance(model.modes, Tolerance) and model.decided is None
-
     def _run(self, number: int) -> Run:
         """A run, with what it shares with the others."""
-        return replace(self._runs[number], shared=self._kept if not self._runs.differ else None)
+        return replace(self._runs[number], shared=self._kept)
 
     def _run_batch(self, numbers: Sequence[int], threads: int) -> int:
         """Do a batch of runs; return the largest number of segments of one."""
-        waiting, starts, levels = list[int](), list[Start](), list[LoadedLevels]()
+        begun, rules = list[tuple[int, Run, LoadedLevels, Start]](), dict[int, Starts]()
         for number in numbers:
             run = self._run(number)
             try:
-                own = replace(run, model=run.model.decided or run.model).levels()
-                starts.append(self._rule(own).first(run.displacement, run.velocity))
-                levels.append(own)
-                waiting.append(number)
+                levels = replace(run, model=run.model.decided or run.model).levels()
+                rule = rules.setdefault(id(levels), Starts(levels, run.t_end))  # a batch keeps its levels
+                begun.append((number, run, levels, rule.first(run.displacement, run.velocity)))
             except MultiPhiError as error:
                 self.results[number] = "failed", str(error), ()
+        if not begun:
+            return 0
+        built = [levels.in_core for _, _, levels, _ in begun]
+        given = [core_start(levels, start) for _, _, levels, start in begun]
+        _, run, levels, _ = begun[0]
+        done = core.run_batch(built, given, *limits(levels.model), levels.drive.time, run.t_end, threads)
         largest = 0
-        if not waiting:
-            return largest
-        built = [each.in_core for each in levels]
-        given = [core_start(own, start) for own, start in zip(levels, starts, strict=True)]
-        end, window = self._runs[0].t_end, limits(levels[0].model)
-        for k, done in enumerate(core.run_batch(built, given, *window, levels[0].drive.time, end, threads)):
-            ahead = Motion.ended(levels[k], built[k], starts[k], done) if done.is_complete else None
-            largest = max(largest, self._finish(waiting[k], ahead))
+        for (number, run, levels, start), in_core, each in zip(begun, built, done, strict=True):
+            ahead = Motion.ended(levels, in_core, start, each) if each.is_complete else None
+            largest = max(largest, self._finish(number, replace(run, ahead=ahead)))
         return largest
 
-    def _rule(self, levels: LoadedLevels) -> Starts:
-        if self._runs.differ:
-            return Starts(levels, self._runs[0].t_end)
-        rule: Starts = self._rules.get_or_build(id(levels), lambda: Starts(levels, self._runs[0].t_end))
-        return rule
-
-    def _finish(self, number: int, ahead: Motion | None) -> int:
-        """Keep the results of a run, done alone unless it is ``ahead``; return its number of segments."""
+    def _finish(self, number: int, run: Run) -> int:
+        """Keep the results of a run, done here unless its motion is ahead; return its number of segments."""
         try:
-            trajectory = run_with_warnings(replace(self._run(number), ahead=ahead))
+            trajectory = run_with_warnings(run)
         except MultiPhiError as error:
             self.results[number] = "failed", str(error), ()
             return 0
@@ -401,7 +390,7 @@ class Task:
             return
         for place, name in enumerate(self._contacts):
             self.impulses[number, place] = trajectory.contact_impulse(name, 0.0, trajectory.t_end)
-            self.contact_times[number, place] = np.sum(np.diff(trajectory.contact_intervals(name), axis=1))
+            self.contact_times[number, place] = sum(b - a for a, b in trajectory.contact_intervals(name))
         if not reached.any():
             return
         segments, times = trajectory.segments, self.times[reached]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.sparse
 
 from multiphi_exudyn.errors import MultiPhiError, MultiPhiTypeError, MultiPhiValueError
 from multiphi_exudyn.levels.model.model import MultiPhiModel
@@ -53,16 +54,18 @@ def write_vtu(
 
 def contact_forces(motion: Histories, model: MultiPhiModel, times: np.ndarray) -> np.ndarray:
     """Forces (n, k) [N] that all contacts, frictions and force laws exert on the structure at times (k,)."""
-    structure, total = model.structure, np.zeros((model.structure.n, len(times)))
+    rows, forces = list[np.ndarray](), list[Any]()
     for element in model.contacts:
-        if isinstance(element, Friction):
-            total -= np.outer(structure.row(element.direction), motion.friction_force(element.name, times))
-            continue
-        total += np.outer(structure.row(element.direction), motion.contact_force(element.name, times))
-        if isinstance(element, UnilateralContact) and element.name in motion.rubbing:
-            assert element.tangential is not None, "friction has a direction"
-            total -= np.outer(structure.row(element.tangential), motion.friction_force(element.name, times))
-    return total
+        if not isinstance(element, Friction):
+            rows.append(model.structure.row(element.direction))
+            forces.append(motion.contact_force(element.name, times))
+        along = element.tangential if isinstance(element, UnilateralContact) else element.direction
+        if along is not None and element.name in (*motion.frictions, *motion.rubbing):
+            rows.append(-model.structure.row(along))
+            forces.append(motion.friction_force(element.name, times))
+    if not rows:
+        return np.zeros((model.structure.n, len(times)))
+    return np.asarray(scipy.sparse.csr_array(np.array(rows)).T @ np.array(forces))
 
 
 def _meshio() -> Any:

@@ -205,3 +205,10 @@ class TestVariedNumbers:
     def test_refusals_name_what_was_given(self, vary, told):
         with pytest.raises(mp.MultiPhiError, match=told):
             mp.simulate_many(model(), END, loads=self.LOADS, vary=vary)
+
+    def test_a_contact_that_never_closes_is_closed_for_no_time(self):
+        found = mp.simulate_many(
+            model(stiffness=50.0), END, displacements=np.zeros(6), vary={"stop.gap": [0.1, 0.2]}, contacts=["stop"]
+        )
+        assert_array_equal(found.contact_times, np.zeros((2, 1)))
+        assert_array_equal(found.impulses, np.zeros((2, 1)))
