@@ -187,7 +187,12 @@ class TestVariedNumbers:
         first, other = given.contacts
         changed = dataclasses.replace(given, contacts=[dataclasses.replace(first, gap=0.11), other])
         built = changed.levels_built
-        mp.simulate(changed, END, displacement=np.full(6, 0.2))
+        run = mp.simulate(changed, END, displacement=np.full(6, 0.2))
+        own = mp.simulate(
+            mp.MultiPhiModel(given.structure, changed.contacts, modes=4), END, displacement=np.full(6, 0.2)
+        )
+        assert [event.time for event in run.events] == [event.time for event in own.events]
+        assert_array_equal(run.at("m5", TIMES), own.at("m5", TIMES))
         assert changed.modal_levels is given.modal_levels
         assert changed.levels_built == given.levels_built >= built
 
